@@ -1,0 +1,37 @@
+# Everything that needs only python3, make and git on the machine.
+BIN := .venv/bin
+UV := $(BIN)/uv pip
+CORES := $(shell nproc 2>/dev/null || echo 2)
+
+.PHONY: demo test check format bench lock setup
+setup: .venv/.installed
+
+.venv/.installed: requirements.lock pyproject.toml
+	python3 -m venv .venv
+	$(BIN)/python -m pip install --quiet "$$(grep -o '^uv==[^ ]*' requirements.lock)"
+	$(UV) sync --quiet --python $(BIN)/python --require-hashes requirements.lock
+	$(UV) install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable .
+	touch $@
+
+demo: setup
+	$(BIN)/airlens demo
+
+test: setup
+	$(BIN)/python -m pytest -n $(CORES) --dist loadscope
+
+check: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports --no-cache
+
+format: setup
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: setup
+	$(BIN)/airlens bench --help
+
+lock: .venv/.installed
+	$(UV) compile --quiet --universal --generate-hashes --no-header --no-annotate --python-version 3.11 \
+	  --group dev pyproject.toml --output-file requirements.lock

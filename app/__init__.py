@@ -1,0 +1,1 @@
+"""Composes drivers, calibration and core: command line, experiments, jobs, service, reports."""

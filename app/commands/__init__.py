@@ -1,0 +1,1 @@
+"""The command line, one module a command; `register(app)` in each adds it. Thin: parse, call, print."""

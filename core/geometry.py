@@ -1,0 +1,129 @@
+"""Boxes, walls and ideal optics.
+
+World: right-handed, metres, z up. Optics: OpenCV axes (+z forward, +y down).
+"""
+
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from core.setting import SettingError, setting
+
+Vector2 = tuple[float, float]
+Vector3 = tuple[float, float, float]
+WallName = Literal["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
+
+
+@setting
+class Box:
+    """The room: an axis-aligned box. The back wall, with the pattern, is its face y = upper_m[1]."""
+
+    lower_m: Vector3
+    upper_m: Vector3
+
+    def __post_init__(self) -> None:
+        for axis, lower, upper in zip("xyz", self.lower_m, self.upper_m, strict=True):
+            if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
+                raise SettingError(
+                    f"The room box has no extent along {axis}: {lower:g} to {upper:g} m. "
+                    "Give lower_m below upper_m on every axis, in metres."
+                )
+        if max(self.size_m) > 2000.0:
+            raise SettingError(
+                f"The room box is {max(self.size_m):g} m long; expected at most 2000 m. "
+                "Were millimetres given for metres?"
+            )
+
+    @property
+    def size_m(self) -> Vector3:
+        """Extent along x, y, z."""
+        sx, sy, sz = (u - low for low, u in zip(self.lower_m, self.upper_m, strict=True))
+        return sx, sy, sz
+
+    @property
+    def centre_m(self) -> Vector3:
+        """Centre point."""
+        cx, cy, cz = ((u + low) / 2 for low, u in zip(self.lower_m, self.upper_m, strict=True))
+        return cx, cy, cz
+
+    def contains(self, point_m: Vector3) -> bool:
+        """Whether the point lies strictly inside."""
+        return all(low < p < u for low, p, u in zip(self.lower_m, point_m, self.upper_m, strict=True))
+
+
+@setting
+class Optics:
+    """A pinhole with Brown-Conrady distortion: a camera, or a projector as an inverse camera.
+
+    `rotation_rad` is the Rodrigues vector of `optics_from_world`, so that a world point x has the
+    optical coordinates R (x - position_m); `distortion` is OpenCV's (k1, k2, p1, p2, k3). Pixel (0, 0)
+    is the centre of the first pixel. Source: OpenCV, "Camera Calibration and 3D Reconstruction".
+    """
+
+    width_px: int
+    height_px: int
+    focal_px: Vector2
+    principal_px: Vector2
+    position_m: Vector3
+    rotation_rad: Vector3
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if self.width_px < 1 or self.height_px < 1:
+            raise SettingError(
+                f"Optics of {self.width_px} x {self.height_px} px; expected at least 1 x 1 px. "
+                "Give width_px and height_px of the sensor or panel."
+            )
+        if min(self.focal_px) <= 0:
+            raise SettingError(
+                f"Focal length is {self.focal_px} px; expected positive values. "
+                "A focal length in px is f / pixel pitch (25 mm over 5 um is 5000 px)."
+            )
+
+    @property
+    def rotation(self) -> Float[np.ndarray, "3 3"]:
+        """`optics_from_world` as a float64 matrix."""
+        return rotation_matrix(self.rotation_rad)
+
+
+def rotation_matrix(rotation_rad: Vector3) -> Float[np.ndarray, "3 3"]:
+    """Rodrigues' formula, float64."""
+    vector = np.asarray(rotation_rad, float)
+    angle = float(np.linalg.norm(vector))
+    cross = np.array(
+        [[0.0, -vector[2], vector[1]], [vector[2], 0.0, -vector[0]], [-vector[1], vector[0], 0.0]]
+    )
+    # sinc forms are exact at angle 0.
+    return (
+        np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * cross @ cross
+    )
+
+
+def rotation_vector(matrix: Float[np.ndarray, "3 3"]) -> Vector3:
+    """The inverse of `rotation_matrix`."""
+    from scipy.spatial.transform import Rotation
+
+    x, y, z = Rotation.from_matrix(matrix).as_rotvec()
+    return float(x), float(y), float(z)
+
+
+def looking_along_y(
+    *,
+    position_m: Vector3,
+    width_px: int,
+    height_px: int,
+    focal_px: float,
+    principal_px: Vector2 | None = None,
+) -> Optics:
+    """Optics at `position_m` looking along world +y with x to the right and z up in the picture."""
+    centre = ((width_px - 1) / 2, (height_px - 1) / 2)
+    return Optics(
+        width_px=width_px,
+        height_px=height_px,
+        focal_px=(focal_px, focal_px),
+        principal_px=principal_px or centre,
+        position_m=position_m,
+        # Rows are the optical axes in the world: x right = +x, y down = -z, z forward = +y.
+        rotation_rad=rotation_vector(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])),
+    )
