@@ -1,0 +1,55 @@
+"""A reconstruction problem: scene, measurements, and what is known at the boundary, as arrays.
+
+A problem does not know how it will be solved. Shifts are far below a pixel, so the flow image is linear
+in the shift: per small window, `information = sum(grad I grad I^T) / variance` and
+`score = sum(grad I (I_flow - I_ref)) / variance` are sufficient statistics for the data term
+
+    1/2 (d - d_hat)^T information (d - d_hat),     d_hat = -information^-1 score,
+
+with the displacement d in px, (column, row), of the pattern seen from I_ref to I_flow.
+"""
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float
+
+from core.scene import Scene
+
+
+class ShiftMeasurement(eqx.Module):
+    """What one view saw, compressed to windows; columns first in every 2-vector."""
+
+    centres_px: Float[np.ndarray, "windows 2"]
+    displacement_px: Float[np.ndarray, "windows 2"]
+    information_per_px2: Float[np.ndarray, "windows 2 2"]
+    window_px: int = eqx.field(static=True)
+
+
+class PlaneData(eqx.Module):
+    """T, p, u on a wall's plane, at vertices along the two other axes (order x, y, z)."""
+
+    wall: str = eqx.field(static=True)
+    first_m: Float[np.ndarray, " first"]
+    second_m: Float[np.ndarray, " second"]
+    temperature_k: Float[np.ndarray, "first second"]
+    pressure_m2_s2: Float[np.ndarray, "first second"]
+    velocity_m_s: Float[np.ndarray, "first second 3"]
+
+
+class SensorData(eqx.Module):
+    """Point sensors; NaN where a sensor does not measure a quantity."""
+
+    position_m: Float[np.ndarray, "sensors 3"]
+    temperature_k: Float[np.ndarray, " sensors"]
+    temperature_std_k: Float[np.ndarray, " sensors"]
+    velocity_m_s: Float[np.ndarray, "sensors 3"]
+    velocity_std_m_s: Float[np.ndarray, " sensors"]
+
+
+class Problem(eqx.Module):
+    """Everything a solver may use. Lists are empty where a scene has no such information."""
+
+    scene: Scene = eqx.field(static=True)
+    shifts: tuple[ShiftMeasurement, ...]
+    planes: tuple[PlaneData, ...] = ()
+    sensors: tuple[SensorData, ...] = ()

@@ -1,0 +1,42 @@
+"""What a solver hands back: the air on a vertex grid, how it ended, and what it cost."""
+
+from enum import Enum
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float
+
+
+class Outcome(Enum):
+    """How a solve ended; the value is the advice."""
+
+    converged = "The solution settled."
+    plateau = "The loss stopped falling; more iterations would not help."
+    step_limit = "The iteration limit was reached. Raise it, or start from this result."
+    time_limit = "The time limit was reached. Raise it, or start from this result."
+    nonfinite = (
+        "A value became infinite or not a number; the last good state is kept. "
+        "Lower the learning rate or check the boundary data."
+    )
+    stopped = "Stopped on request; the checkpoint can be resumed."
+
+
+class Solution(eqx.Module):
+    """T, p, u on vertices (end planes included), index order [ix, iy, iz]; None where not solved for.
+
+    Standard deviations are one sigma, on the same grid. `history` holds one dict a recorded iteration.
+    """
+
+    x_m: Float[np.ndarray, " nx"]
+    y_m: Float[np.ndarray, " ny"]
+    z_m: Float[np.ndarray, " nz"]
+    temperature_k: Float[np.ndarray, "nx ny nz"]
+    pressure_m2_s2: Float[np.ndarray, "nx ny nz"] | None = None
+    velocity_m_s: Float[np.ndarray, "nx ny nz 3"] | None = None
+    temperature_std_k: Float[np.ndarray, "nx ny nz"] | None = None
+    pressure_std_m2_s2: Float[np.ndarray, "nx ny nz"] | None = None
+    velocity_std_m_s: Float[np.ndarray, "nx ny nz 3"] | None = None
+    outcome: Outcome = eqx.field(static=True, default=Outcome.converged)
+    solver_s: float = 0.0
+    history: tuple[dict[str, float], ...] = eqx.field(static=True, default=())
+    notes: tuple[str, ...] = eqx.field(static=True, default=())
