@@ -116,7 +116,11 @@ class Patch:
 
 @setting
 class Inlet:
-    """Supply air through a patch; the standard deviations are the operator's uncertainty."""
+    """Supply air through a patch; the standard deviations are the operator's uncertainty.
+
+    `length_scale_m` is the mixing length of the supply's turbulence; None takes 0.07 of the patch's
+    hydraulic diameter.
+    """
 
     kind: Literal["inlet"] = "inlet"
     patch: Patch
@@ -125,7 +129,7 @@ class Inlet:
     temperature_std_k: float = 0.1
     velocity_std_m_s: float = 0.01
     turbulence_intensity: float = 0.1
-    length_scale_m: float = 0.07
+    length_scale_m: float | None = None
 
 
 @setting
