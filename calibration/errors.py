@@ -1,0 +1,18 @@
+"""What can go wrong in a calibration: the message says what was seen, what was expected, what to retake.
+
+CalibrationError
+ ├─ BundleError    a bundle that cannot be read or lacks a part
+ └─ ImageError     images that cannot be used: unreadable, mixed sizes, out of order, missing
+"""
+
+
+class CalibrationError(ValueError):
+    """A calibration that cannot be made from what was given."""
+
+
+class BundleError(CalibrationError):
+    """A bundle that cannot be read, or that lacks the part asked for."""
+
+
+class ImageError(CalibrationError):
+    """Images that cannot be used for a calibration."""
