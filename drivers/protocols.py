@@ -1,7 +1,7 @@
 """What the rest of the program may ask of a camera: one narrow Protocol for real devices and twins."""
 
 from dataclasses import dataclass, field
-from typing import Protocol, Self, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import UInt8, UInt16
@@ -67,10 +67,24 @@ class Camera(Protocol):
         """
         ...
 
+    def follow(self) -> Frame:
+        """Return the frame that comes directly after the last returned one: bursts at the camera's rate.
+
+        Raises as `grab` does; FrameError also when frames between the last one and this one were lost.
+        """
+        ...
+
+    def reconnect(self) -> None:
+        """Open the same device again with the same settings, after an unplug or a fatal error.
+
+        Raises DeviceNotFoundError while it is still away. Needs no restart of the program.
+        """
+        ...
+
     def close(self) -> None:
         """Stop and free the device. Safe to call twice, also after an unplug."""
         ...
 
-    def __enter__(self) -> Self: ...
+    def __enter__(self) -> "Camera": ...
 
     def __exit__(self, *exception: object) -> None: ...

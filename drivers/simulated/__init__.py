@@ -1,1 +1,6 @@
 """Simulated twins of the devices, behind the same Protocols. Used by `app.rig` and tests only."""
+
+from drivers.simulated.camera import SimulatedCamera as SimulatedCamera
+from drivers.simulated.clock import VirtualClock as VirtualClock
+from drivers.simulated.faults import CameraFault as CameraFault
+from drivers.simulated.sensor import SensorNoise as SensorNoise

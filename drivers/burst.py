@@ -1,0 +1,104 @@
+"""What a burst is: the plan (asked), the records (happened), the moments (kept), and how it ended."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float32
+
+from drivers.errors import DeviceSettingError
+from drivers.protocols import CameraInfo
+from drivers.verdict import Verdict
+
+CaptureKind = Literal["reference", "flow", "dark", "flat"]
+
+
+@dataclass(frozen=True)
+class CapturePlan:
+    """A burst as data. Settings left at None stay as the operator has them.
+
+    `settle_s` is waited first; then frames are discarded until two in a row agree in their mean to
+    `settle_tolerance` (a part of it), at most `settle_frames` of them. `max_refused` ends a burst whose
+    camera keeps losing frames. `refresh_hz` is the projector's: exposures that are not a whole number of
+    its periods are warned of. `warm_up_s`: how long the rig should have been on.
+    """
+
+    kind: CaptureKind = "reference"
+    frames: int = 100
+    exposure_s: float | None = None
+    gain: float | None = None
+    settle_s: float = 0.0
+    settle_tolerance: float = 0.002
+    settle_frames: int = 30
+    max_refused: int = 100
+    refresh_hz: float | None = None
+    warm_up_s: float = 1800.0
+    raw_stack: bool = False
+
+    def __post_init__(self) -> None:
+        if self.frames < 1 or self.settle_s < 0 or self.max_refused < 0:
+            raise DeviceSettingError(
+                f"A capture plan has frames {self.frames}, settle_s {self.settle_s:g}, max_refused "
+                f"{self.max_refused}; expected at least one frame and no negative number."
+            )
+
+
+class BurstOutcome(StrEnum):
+    """How a burst ended. Only COMPLETE is a measurement; of the others the frames so far are kept."""
+
+    COMPLETE = "complete"
+    ABORTED = "aborted"
+    DEVICE_LOST = "device lost"
+    TOO_MANY_REFUSED = "too many refused"
+
+
+@dataclass(frozen=True)
+class FrameRecord:
+    """Metadata of one frame in the mean. `level` and `saturated` are parts of full scale and of pixels."""
+
+    sequence: int
+    timestamp_s: float
+    level: float
+    saturated: float
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting as asked for, and as the device has it."""
+
+    name: str
+    asked: float | None
+    granted: float
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a burst is."""
+
+    done: int
+    total: int
+    refused: int
+    level: float
+
+
+@dataclass(frozen=True)
+class Burst:
+    """Mean and standard deviation of one frame, in parts of full scale, with all that is known of them."""
+
+    mean: Float32[np.ndarray, "rows cols"]
+    std: Float32[np.ndarray, "rows cols"]
+    plan: CapturePlan
+    outcome: BurstOutcome
+    camera: CameraInfo
+    full_scale_counts: int
+    settings: tuple[Setting, ...]
+    records: tuple[FrameRecord, ...]
+    refused: Mapping[str, int] = field(default_factory=dict)
+    verdicts: tuple[Verdict, ...] = ()
+
+    @property
+    def frames(self) -> int:
+        """Frames in the mean."""
+        return len(self.records)

@@ -1,0 +1,189 @@
+"""Take a burst: settle, then mean and variance of good frames only, one after another at the camera's rate.
+
+Frames that were lost, late or corrupt are refused by the camera's gate, counted here and taken again. An
+abort acts within a frame. Whatever ends a burst early, what was taken before is handed back and says so.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+
+from drivers.burst import Burst, BurstOutcome, CapturePlan, FrameRecord, Progress, Setting
+from drivers.clock import Clock, SystemClock
+from drivers.errors import DeviceNotFoundError, DeviceSettingError, DeviceTimeoutError, FrameError, FrameFault
+from drivers.moments import RunningMoments
+from drivers.protocols import Camera, Frame
+from drivers.verdict import (
+    Verdict,
+    judge_beat,
+    judge_dark,
+    judge_flicker,
+    judge_images,
+    judge_level,
+    judge_refused,
+    judge_saturation,
+    judge_warm_up,
+)
+
+OnProgress = Callable[[Progress], object]
+OnFrame = Callable[[Frame, FrameRecord], object]
+Abort = Callable[[], bool]
+
+
+def run_capture(
+    camera: Camera,
+    plan: CapturePlan,
+    on_progress: OnProgress | None = None,
+    *,
+    on_frame: OnFrame | None = None,
+    abort: Abort | None = None,
+    clock: Clock | None = None,
+    rig_on_s: float | None = None,
+) -> Burst:
+    """Return the burst that `plan` asks for; `burst.outcome` says whether it is whole.
+
+    `on_frame` receives every good frame (for a raw stack); `rig_on_s` is how long the rig has been on.
+    Raises DeviceSettingError when a setting is not granted, DeviceError when not even one frame came.
+    """
+    settings = _apply(camera, plan)
+    (clock or SystemClock()).sleep_s(plan.settle_s)
+    taker = _Taker(camera, plan, abort or (lambda: False))
+    settled = _settle(taker, plan)
+    moments, records, full_scale = RunningMoments(), [], 1
+    while taker.outcome is BurstOutcome.COMPLETE and len(records) < plan.frames:
+        frame = taker.take()
+        if frame is None:
+            continue
+        record = _record(frame)
+        moments.add(frame.pixels)
+        records.append(record)
+        full_scale = frame.full_scale_counts
+        if on_frame:
+            on_frame(frame, record)
+        if on_progress:
+            on_progress(Progress(len(records), plan.frames, taker.refused.total(), record.level))
+    if not records and taker.lost is not None:
+        raise taker.lost
+    if not records:
+        moments.add(np.zeros((camera.info.height_px, camera.info.width_px), np.uint16))
+    mean, std = moments.mean(full_scale), moments.std(full_scale)
+    judged = (
+        *settled,
+        *_judge_moments(mean, std, plan, len(records)),
+        *_judge_records(records, plan, camera, taker.refused.total(), rig_on_s),
+    )
+    refused = {str(fault): count for fault, count in taker.refused.items()}
+    return Burst(
+        mean, std, plan, taker.outcome, camera.info, full_scale, settings, tuple(records), refused, judged
+    )
+
+
+class _Taker:
+    """Takes good frames and counts the others; `outcome` leaves COMPLETE when the burst cannot go on."""
+
+    def __init__(self, camera: Camera, plan: CapturePlan, abort: Abort) -> None:
+        self.outcome = BurstOutcome.COMPLETE
+        self.refused: Counter[FrameFault] = Counter()
+        self.lost: Exception | None = None
+        self._camera, self._abort, self._max_refused = camera, abort, plan.max_refused
+        self._fresh = True
+
+    def take(self) -> Frame | None:
+        """Return the next frame, or None when it was refused or the burst ended."""
+        if self._abort():
+            self.outcome = BurstOutcome.ABORTED
+            return None
+        try:
+            frame = self._camera.grab() if self._fresh else self._camera.follow()
+            self._fresh = False
+            return frame
+        except FrameError as error:
+            self._refuse(error.fault, error.lost, error)
+        except DeviceTimeoutError as error:
+            self._fresh = True
+            self._refuse(FrameFault.MISSING, 1, error)
+        except DeviceNotFoundError as error:
+            self.outcome, self.lost = BurstOutcome.DEVICE_LOST, error
+        return None
+
+    def _refuse(self, fault: FrameFault, lost: int, error: Exception) -> None:
+        self.refused[fault] += lost
+        if self.refused.total() > self._max_refused:
+            self.outcome, self.lost = BurstOutcome.TOO_MANY_REFUSED, error
+
+
+def _apply(camera: Camera, plan: CapturePlan) -> tuple[Setting, ...]:
+    if plan.exposure_s is not None:
+        camera.exposure_s = plan.exposure_s
+    if plan.gain is not None:
+        camera.gain = plan.gain
+    settings = (
+        Setting("exposure_s", plan.exposure_s, camera.exposure_s),
+        Setting("gain", plan.gain, camera.gain),
+    )
+    for one in settings:
+        if one.asked is not None and abs(one.granted - one.asked) > 0.01 * abs(one.asked) + 1e-4:
+            raise DeviceSettingError(
+                f"{one.name} is {one.granted:g} after {one.asked:g} was asked for. "
+                "Choose a value that the camera has, and switch its automatic control off."
+            )
+    return settings
+
+
+def _settle(taker: _Taker, plan: CapturePlan) -> tuple[Verdict, ...]:
+    """Discard frames until two in a row have the same brightness; cameras differ in how long that takes."""
+    before, change = None, float("inf")
+    for _ in range(plan.settle_frames):
+        if taker.outcome is not BurstOutcome.COMPLETE:
+            return ()
+        frame = taker.take()
+        if frame is None:
+            continue
+        level = _record(frame).level
+        change = abs(level - before) / max(level, 1e-9) if before is not None else change
+        if change <= plan.settle_tolerance:
+            return ()
+        before = level
+    if plan.settle_frames < 2:
+        return ()
+    advice = "Switch automatic exposure, gain and dynamic iris off; wait until the projector is steady."
+    return (
+        Verdict(
+            "settling", False, change, f"two frames alike to {plan.settle_tolerance:g} of the level", advice
+        ),
+    )
+
+
+def _record(frame: Frame) -> FrameRecord:
+    stride = 4 if frame.pixels.size > 1_000_000 else 1
+    sample = frame.pixels[::stride, ::stride]
+    saturated = np.count_nonzero(frame.pixels >= frame.full_scale_counts) / frame.pixels.size
+    level = float(sample.mean()) / frame.full_scale_counts
+    return FrameRecord(frame.sequence, frame.timestamp_s, level, float(saturated))
+
+
+def _judge_moments(mean: np.ndarray, std: np.ndarray, plan: CapturePlan, frames: int) -> tuple[Verdict, ...]:
+    if frames == 0:
+        return ()
+    if plan.kind == "dark":
+        return (judge_dark(mean),)
+    if plan.kind == "flat":
+        return (judge_level(mean),)
+    return judge_images(mean, std, frames)
+
+
+def _judge_records(
+    records: list[FrameRecord], plan: CapturePlan, camera: Camera, refused: int, rig_on_s: float | None
+) -> list[Verdict]:
+    exposure_s = camera.exposure_s
+    verdicts = [
+        judge_saturation([record.saturated for record in records], exposure_s),
+        judge_flicker([record.level for record in records]),
+        judge_refused(refused, len(records)),
+    ]
+    if plan.refresh_hz is not None:
+        verdicts.append(judge_beat(exposure_s, plan.refresh_hz))
+    if rig_on_s is not None:
+        verdicts.append(judge_warm_up(rig_on_s, plan.warm_up_s))
+    return verdicts
