@@ -1,0 +1,118 @@
+"""One error shape for everything that can go wrong: RFC 9457 problem JSON with code, cause and next step."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pydantic import BaseModel, ConfigDict
+from starlette.exceptions import HTTPException
+
+MEDIA_TYPE = "application/problem+json"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A stable code's status, title and usual next step."""
+
+    status: int
+    title: str
+    next_step: str
+
+
+KINDS: Mapping[str, Kind] = {
+    "bad_request": Kind(400, "The request cannot be read", "Correct the request and send it again."),
+    "token_missing": Kind(
+        401, "No valid token", "Open the address that `airlens serve` prints, or send the token as a bearer."
+    ),
+    "host_refused": Kind(
+        403, "This host name is not served", "Use the address that `airlens serve` printed, unchanged."
+    ),
+    "origin_refused": Kind(
+        403, "Requests from this page are refused", "Open the address of the service itself in the browser."
+    ),
+    "not_found": Kind(404, "There is no such thing", "List the parent resource to see what there is."),
+    "method_not_allowed": Kind(405, "This cannot be done here", "Use one of the methods in `Allow`."),
+    "conflict": Kind(409, "The state does not allow this", "Read the resource's state and try again."),
+    "too_large": Kind(413, "The content is too large", "Send less, or a cropped or binned version."),
+    "media_type_refused": Kind(415, "This kind of content is not accepted", "Send one of the kinds named."),
+    "invalid": Kind(422, "A value is not valid", "Correct the fields listed under `errors`."),
+    "content_refused": Kind(
+        422, "The content cannot be used", "Check the file in the program that wrote it."
+    ),
+    "bad_input": Kind(422, "An input cannot be used", "Correct the input that the cause names."),
+    "rate_limited": Kind(429, "Too many requests", "Wait for the seconds in `Retry-After`."),
+    "internal": Kind(
+        500, "The service has a fault", "Try again; if it stays, send the service's log with this instance."
+    ),
+    "failed": Kind(500, "The operation failed", "Follow the cause, then try again."),
+    "device_failed": Kind(503, "A device failed", "Check the device and reconnect it."),
+    "unavailable": Kind(503, "Not available now", "Try again in a moment."),
+    "disk_full": Kind(507, "The disk is full", "Free space on the data disk; nothing half-written was kept."),
+}
+
+
+class FieldError(BaseModel):
+    """One field that was not accepted."""
+
+    model_config = ConfigDict(extra="forbid")
+    field: str
+    message: str
+
+
+class Problem(BaseModel):
+    """RFC 9457 problem details. `detail` is written for the operator and is shown as it is."""
+
+    model_config = ConfigDict(extra="forbid")
+    type: str
+    title: str
+    status: int
+    code: str
+    detail: str
+    cause: str
+    next_step: str
+    instance: str | None = None
+    errors: list[FieldError] = []
+
+
+class ApiError(HTTPException):
+    """A foreseen refusal or failure; raised anywhere below the guard, shown as a `Problem`."""
+
+    def __init__(
+        self,
+        code: str,
+        cause: str,
+        next_step: str | None = None,
+        *,
+        errors: list[FieldError] | None = None,
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        super().__init__(KINDS[code].status, cause, dict(headers) if headers else None)
+        self.code = code
+        self.cause = cause
+        self.next_step = next_step
+        self.errors = errors or []
+
+
+def problem_of(error: ApiError, instance: str | None = None) -> Problem:
+    """Return the problem that describes `error`."""
+    kind = KINDS[error.code]
+    next_step = error.next_step or kind.next_step
+    cause = error.cause.strip()
+    detail = cause if next_step in cause else f"{cause} {next_step}"
+    return Problem(
+        type=f"urn:airlens:problem:{error.code}",
+        title=kind.title,
+        status=kind.status,
+        code=error.code,
+        detail=detail,
+        cause=cause,
+        next_step=next_step,
+        instance=instance,
+        errors=error.errors,
+    )
+
+
+def body_of(error: ApiError, instance: str | None = None) -> bytes:
+    """Return `problem_of(error)` as UTF-8 JSON; characters that cannot be encoded are replaced."""
+    content = problem_of(error, instance).model_dump(exclude_none=True)
+    return json.dumps(content, ensure_ascii=True).encode()

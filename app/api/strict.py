@@ -1,0 +1,17 @@
+"""The base of everything that crosses the API: strict, closed, unchangeable."""
+
+from typing import Annotated
+
+from fastapi import Path
+from pydantic import BaseModel, ConfigDict
+
+ID_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
+
+
+class Strict(BaseModel):
+    """No coercion (`false` is not 0.0), no unknown fields, no NaN, no change after validation."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Identifier = Annotated[str, Path(pattern=ID_PATTERN, description="An id that the service gave.")]
