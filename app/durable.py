@@ -14,14 +14,14 @@ from typing import Any
 @contextlib.contextmanager
 def durable_path(path: Path) -> Iterator[Path]:
     """Yield a temporary path to write to; on success it becomes `path`, on failure it is removed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     # The suffix stays last: writers choose their format by it.
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
     try:
         yield temporary
-        _fsync(temporary)
+        sync(temporary)
         temporary.replace(path)
-        _fsync(path.parent)
+        sync(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -42,7 +42,29 @@ def write_json(path: Path, content: Any) -> None:
     write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
-def _fsync(path: Path) -> None:
+def make_folder(path: Path) -> None:
+    """Create `path` and its parents so that a power cut does not lose them; existing ones are kept."""
+    missing = [folder for folder in (path, *path.parents) if not folder.exists()]
+    for folder in reversed(missing):
+        folder.mkdir(exist_ok=True)
+        sync(folder.parent)
+
+
+def publish_folder(staging: Path, target: Path) -> None:
+    """Put a finished folder in place of `target`, which must not exist or be empty: whole, or not at all.
+
+    Both are on one file system. Raises OSError (ENOTEMPTY, EEXIST) when `target` holds something.
+    """
+    for folder, _, files in os.walk(staging):
+        for name in files:
+            sync(Path(folder) / name)
+        sync(Path(folder))
+    staging.rename(target)
+    sync(target.parent)
+
+
+def sync(path: Path) -> None:
+    """Flush a file's or a folder's content to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

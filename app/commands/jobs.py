@@ -1,0 +1,161 @@
+"""`airlens jobs`: queue, watch, order, stop and go on with computations."""
+
+import json
+import logging
+import signal
+import threading
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from app.errors import BadInputError
+from app.jobs import Event, Job, JobSpec, JobState, Ledger, Supervisor, read_config
+
+Folder = Annotated[
+    Path, typer.Option("--folder", envvar="AIRLENS_JOBS", help="The folder of the ledger and its jobs.")
+]
+JobId = Annotated[str, typer.Argument(help="The job's id.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+HERE = Path("jobs")
+
+
+def register(cli: typer.Typer) -> None:
+    """Add `jobs` and its subcommands."""
+    jobs = typer.Typer(no_args_is_help=True, help="Queue, watch, stop and resume computations.")
+    for command in (run, submit, show, events, cancel, pause, resume, retry, order):
+        jobs.command()(command)
+    jobs.command("list")(list_jobs)
+    cli.add_typer(jobs, name="jobs")
+
+
+def run(folder: Folder = HERE) -> None:
+    """Run the queue until interrupted; running jobs go on and are adopted by the next `run`."""
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s")
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    Supervisor(Ledger(folder), read_config(folder)).run(stop)
+
+
+def submit(
+    kind: Annotated[str, typer.Argument(help="What to compute, such as reconstruct or noise-study.")],
+    settings: Annotated[list[str] | None, typer.Argument(help="Settings as NAME=VALUE (JSON).")] = None,
+    experiment: Annotated[Path | None, typer.Option(help="The experiment's folder.")] = None,
+    title: Annotated[str, typer.Option(help="A name for people.")] = "",
+    priority: Annotated[int, typer.Option(help="Higher starts first.")] = 0,
+    folder: Folder = HERE,
+    as_json: AsJson = False,
+) -> None:
+    """Queue one job and print its id."""
+    spec = JobSpec(
+        kind=kind, settings=read_settings(settings), experiment=experiment, title=title, priority=priority
+    )
+    _print_job(Ledger(folder).submit(spec), as_json)
+
+
+def list_jobs(
+    state: Annotated[list[JobState] | None, typer.Option(help="Only jobs in this state.")] = None,
+    folder: Folder = HERE,
+    as_json: AsJson = False,
+) -> None:
+    """List jobs: the running ones, the waiting in their order, the ended."""
+    found = Ledger(folder).jobs(states=state or None)
+    if as_json:
+        typer.echo(json.dumps([plain(job) for job in found], indent=1))
+        return
+    table = Table("id", "title", "state", "progress", "attempt", "device", "reason")
+    for job in found:
+        share = f"{job.progress:.0%}"
+        table.add_row(job.id, job.title, job.state, share, str(job.attempt), job.device or "", job.reason)
+    Console().print(table)
+
+
+def show(job: JobId, folder: Folder = HERE, as_json: AsJson = False) -> None:
+    """Show one job."""
+    _print_job(Ledger(folder).get(job), as_json)
+
+
+def events(
+    job: Annotated[str | None, typer.Argument(help="Only this job's events.")] = None,
+    after: Annotated[int, typer.Option(help="Only events with a larger id.")] = 0,
+    follow: Annotated[bool, typer.Option(help="Wait for more until interrupted.")] = False,
+    folder: Folder = HERE,
+) -> None:
+    """Print events as JSON lines, oldest first."""
+    ledger = Ledger(folder)
+    while True:
+        found = ledger.events(after=after, job=job)
+        for event in found:
+            typer.echo(json.dumps(_plain_event(event)))
+            after = event.id
+        if not found and not follow:
+            return
+        if not found:
+            time.sleep(0.5)
+
+
+def cancel(job: JobId, folder: Folder = HERE, as_json: AsJson = False) -> None:
+    """Stop a job; its checkpoint is kept and `retry` goes on from it."""
+    _print_job(Ledger(folder).cancel(job), as_json)
+
+
+def pause(job: JobId, folder: Folder = HERE, as_json: AsJson = False) -> None:
+    """Stop a job at a checkpoint until `resume`."""
+    _print_job(Ledger(folder).pause(job), as_json)
+
+
+def resume(job: JobId, folder: Folder = HERE, as_json: AsJson = False) -> None:
+    """Queue a paused job again."""
+    _print_job(Ledger(folder).resume(job), as_json)
+
+
+def retry(job: JobId, folder: Folder = HERE, as_json: AsJson = False) -> None:
+    """Queue a failed, cancelled or lost job again."""
+    _print_job(Ledger(folder).retry(job), as_json)
+
+
+def order(
+    job: JobId,
+    before: Annotated[str | None, typer.Option(help="Put it before this job.")] = None,
+    priority: Annotated[int | None, typer.Option(help="Set its priority instead.")] = None,
+    folder: Folder = HERE,
+    as_json: AsJson = False,
+) -> None:
+    """Put a waiting job first, before another, or at another priority."""
+    ledger = Ledger(folder)
+    moved = ledger.move_before(job, before) if priority is None else ledger.set_priority(job, priority)
+    _print_job(moved, as_json)
+
+
+def read_settings(words: list[str] | None) -> dict[str, Any]:
+    """Return NAME=VALUE words as settings; a value that is no JSON is taken as text."""
+    settings: dict[str, Any] = {}
+    for word in words or []:
+        name, equals, text = word.partition("=")
+        if not equals or not name:
+            raise BadInputError(f"{word!r} is not NAME=VALUE. Write, for example, trials=200.")
+        try:
+            settings[name] = json.loads(text)
+        except json.JSONDecodeError:
+            settings[name] = text
+    return settings
+
+
+def plain(job: Job) -> dict[str, Any]:
+    """Return a job as JSON values."""
+    values = {name: getattr(job, name) for name in Job.__dataclass_fields__}
+    experiment = str(job.experiment) if job.experiment else None
+    return values | {"progress": job.progress, "experiment": experiment}
+
+
+def _print_job(job: Job, as_json: bool) -> None:
+    line = f"{job.id}  {job.title}  {job.state}  {job.progress:.0%}  {job.reason}".rstrip()
+    typer.echo(json.dumps(plain(job)) if as_json else line)
+
+
+def _plain_event(event: Event) -> dict[str, Any]:
+    return {name: getattr(event, name) for name in Event.__dataclass_fields__}

@@ -1,0 +1,25 @@
+"""Jobs: a ledger that loses nothing, a supervisor, and engines that only start and stop processes."""
+
+from app.jobs.config import JobsConfig, read_config
+from app.jobs.errors import EngineError, FencedError, JobError, LedgerError, UnknownJobError
+from app.jobs.ledger import Ledger
+from app.jobs.records import Event, Group, Job, JobSpec
+from app.jobs.state import JobState
+from app.jobs.supervisor import Supervisor
+
+__all__ = [
+    "EngineError",
+    "Event",
+    "FencedError",
+    "Group",
+    "Job",
+    "JobError",
+    "JobSpec",
+    "JobState",
+    "JobsConfig",
+    "Ledger",
+    "LedgerError",
+    "Supervisor",
+    "UnknownJobError",
+    "read_config",
+]

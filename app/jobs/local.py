@@ -1,0 +1,107 @@
+"""The local engine: one subprocess a device, no set-up. It outlives the supervisor, which adopts it again."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+
+from app.jobs.engine import Launch, ProcessState
+from app.jobs.errors import EngineError
+from app.jobs.folder import JobFolder, read_json
+
+
+class LocalEngine:
+    """Workers as child processes in sessions of their own. The handle is `pid:start time`."""
+
+    name = "local"
+    is_local = True
+
+    def __init__(self, cache: Path) -> None:
+        self._cache = cache
+        self._children: dict[str, subprocess.Popen[bytes]] = {}
+
+    def probe(self) -> None:
+        """Nothing to check: the machine is here."""
+
+    def start(self, launch: Launch) -> str:
+        """Start the worker. Raises EngineError when the system refuses."""
+        log_path = JobFolder(launch.folder).attempt(launch.attempt) / "log.txt"
+        command = [sys.executable, *launch.worker_arguments]
+        try:
+            with open(log_path, "ab") as log:
+                child = subprocess.Popen(
+                    command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    env=_environment(launch.device, self._cache),
+                    start_new_session=True,
+                )
+        except OSError as error:
+            raise EngineError(
+                f"The worker could not be started: {error}. Free memory or disk space."
+            ) from error
+        handle = f"{child.pid}:{_created_s(child.pid)}"
+        self._children[handle] = child
+        return handle
+
+    def find(self, launch: Launch) -> str | None:
+        """Return the handle that the worker left in its folder."""
+        content = read_json(JobFolder(launch.folder).attempt(launch.attempt) / "worker.json")
+        return f"{content['pid']}:{content['created_s']}" if content else None
+
+    def state(self, handle: str) -> ProcessState:
+        """Say whether that very process lives; another one with the same number does not count."""
+        child = self._children.get(handle)
+        if child is not None and child.poll() is not None:
+            del self._children[handle]
+            return ProcessState.gone
+        return ProcessState.gone if _process(handle) is None else ProcessState.running
+
+    def stop(self, handle: str, *, kill: bool = False) -> None:
+        """Signal the worker: SIGTERM to itself, SIGKILL to its whole session."""
+        process = _process(handle)
+        with contextlib.suppress(ProcessLookupError, psutil.NoSuchProcess):
+            if process is not None and kill:
+                os.killpg(process.pid, signal.SIGKILL)
+            elif process is not None:
+                process.terminate()
+
+    def memory_bytes(self, handle: str) -> int:
+        """Return the resident memory of the worker, 0 when it is gone."""
+        process = _process(handle)
+        with contextlib.suppress(psutil.NoSuchProcess):
+            return process.memory_info().rss if process else 0
+        return 0
+
+
+def _environment(device: str, cache: Path) -> dict[str, str]:
+    """Return the worker's environment: its device, a kept compilation cache, no token of the service."""
+    variables = {name: value for name, value in os.environ.items() if "TOKEN" not in name}
+    kind, _, index = device.partition(":")
+    variables["JAX_COMPILATION_CACHE_DIR"] = str(cache)
+    variables["JAX_PLATFORMS"] = "cpu" if kind == "cpu" else variables.get("JAX_PLATFORMS", "")
+    if kind == "gpu":
+        variables["CUDA_VISIBLE_DEVICES"] = index or "0"
+    return variables
+
+
+def _process(handle: str) -> psutil.Process | None:
+    pid, _, created_s = handle.partition(":")
+    try:
+        process = psutil.Process(int(pid))
+        is_same = abs(process.create_time() - float(created_s)) < 1.0
+        return process if is_same and process.status() != psutil.STATUS_ZOMBIE else None
+    except psutil.NoSuchProcess:
+        return None
+
+
+def _created_s(pid: int) -> float:
+    try:
+        return psutil.Process(pid).create_time()
+    except psutil.NoSuchProcess:
+        return 0.0

@@ -1,0 +1,111 @@
+"""What a running computation may do: read its order, write checkpoints, tell progress, notice a stop."""
+
+import contextlib
+import json
+import math
+import shutil
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from app.durable import make_folder, publish_folder, write_json
+from app.jobs.folder import JobFolder, Owner
+
+
+class StoppedError(Exception):
+    """The computation has written its checkpoint and ends, as it was asked to."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One attempt at one job, as its computation sees it."""
+
+    folder: JobFolder
+    owner: Owner
+    experiment: Path | None
+    output: Path
+    stop: threading.Event = field(default_factory=threading.Event)
+
+    @property
+    def checkpoints(self) -> Path:
+        """The folder for checkpoints; it already holds those of the attempt before."""
+        return self.folder.attempt(self.owner.attempt) / "checkpoint"
+
+    def tell(self, kind: str, body: Mapping[str, Any]) -> None:
+        """Append an event. Not flushed to disk: progress is told, not promised."""
+        line = json.dumps({"at_s": time.time(), "kind": kind, "body": dict(body)}, allow_nan=False)
+        with open(self.folder.attempt(self.owner.attempt) / "events.jsonl", "a", encoding="utf-8") as file:
+            file.write(line + "\n")
+
+    def progress(self, step: int, steps: int, values: Mapping[str, float] | None = None) -> None:
+        """Tell how far the computation is, with the values worth a curve."""
+        finite = {name: value if math.isfinite(value) else None for name, value in (values or {}).items()}
+        self.tell("progress", {"step": step, "steps": steps, **finite})
+
+    def check_stop(self) -> None:
+        """Raise StoppedError when the job was asked to stop. Call it after writing a checkpoint."""
+        if self.stop.is_set():
+            raise StoppedError
+
+
+class CheckpointClock:
+    """Says when a checkpoint is due: at least every minute, and never for more than 1 % of the time."""
+
+    _LONGEST_S, _SHARE = 60.0, 0.01
+
+    def __init__(self) -> None:
+        self._last_s = time.monotonic()
+        self._cost_s = 0.0
+
+    def is_due(self) -> bool:
+        """True when it is time for the next checkpoint."""
+        pause_s = min(self._LONGEST_S, max(0.25, self._cost_s / self._SHARE))
+        return time.monotonic() - self._last_s >= pause_s
+
+    @contextlib.contextmanager
+    def measure(self) -> Iterator[None]:
+        """Measure what writing a checkpoint costs."""
+        start_s = time.monotonic()
+        yield
+        self._last_s = time.monotonic()
+        self._cost_s = self._last_s - start_s
+
+
+def inherit_checkpoint(folder: JobFolder, number: int) -> None:
+    """Copy the newest earlier checkpoint into this attempt's folder, whole or not at all.
+
+    An older attempt may still be alive and writing: it never sees the copy. Leftovers are removed.
+    """
+    own = folder.attempt(number) / "checkpoint"
+    for earlier in range(number - 1, 0, -1):
+        source = folder.attempt(earlier) / "checkpoint"
+        files = [path for path in _entries(source) if not path.name.startswith(".")]
+        if files and not own.exists():
+            copy = own.with_name(".checkpoint.tmp")
+            shutil.rmtree(copy, ignore_errors=True)
+            make_folder(copy)
+            for path in files:
+                shutil.copyfile(path, copy / path.name)
+            publish_folder(copy, own)
+        elif own.exists() and earlier < number - 1:
+            shutil.rmtree(source, ignore_errors=True)
+        shutil.rmtree(folder.staging(earlier), ignore_errors=True)
+    make_folder(own)
+
+
+def publish(task: Task, summary: Mapping[str, Any]) -> None:
+    """Put the finished folder in place by one rename. Raises FencedError when replaced."""
+    write_json(task.output / "result.json", {"summary": dict(summary)})
+    with task.folder.locked():
+        task.folder.check(task.owner)
+        publish_folder(task.output, task.folder.target())
+
+
+def _entries(folder: Path) -> list[Path]:
+    try:
+        return sorted(path for path in folder.iterdir() if path.is_file())
+    except FileNotFoundError:
+        return []

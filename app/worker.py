@@ -1,0 +1,131 @@
+"""`python -m app.worker JOBDIR`: run one attempt at one job. Every engine runs this same command.
+
+SIGTERM: write a checkpoint, exit 75. Exit status: 0 done, 1 failed, 74 no space, 75 stopped and
+resumable, 76 fenced (a newer attempt owns the job), 77 another process already runs this attempt.
+"""
+
+import argparse
+import errno
+import os
+import shutil
+import signal
+import socket
+import sys
+import threading
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+
+import psutil
+
+from app.durable import make_folder, write_json
+from app.errors import AirlensError
+from app.jobs import kinds
+from app.jobs.errors import FencedError
+from app.jobs.folder import JobFolder, Owner, beat, try_lock
+from app.jobs.task import StoppedError, Task, inherit_checkpoint, publish
+from app.jobs.worker_status import DONE, FAILED, FENCED, NO_SPACE, STOPPED, TAKEN
+from core.setting import SettingError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the worker; return its exit status."""
+    parser = argparse.ArgumentParser(prog="app.worker", description="Run one job.")
+    parser.add_argument("folder", type=Path, help="the job's folder")
+    parser.add_argument("--attempt", type=int, default=None, help="refuse to run unless this attempt owns it")
+    parser.add_argument(
+        "--lease-s", type=float, default=15.0, help="stop when the lease was not renewed so long"
+    )
+    options = parser.parse_args(arguments)
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    folder = JobFolder(options.folder.resolve())
+    owner = folder.owner()
+    if options.attempt not in (None, owner.attempt):
+        return FENCED
+    lock = try_lock(folder.attempt(owner.attempt) / "worker.lock")
+    if lock is None:
+        return TAKEN
+    with lock:
+        _introduce(folder, owner)
+        threading.Thread(target=_renew, args=(folder, owner, options.lease_s), daemon=True).start()
+        return _attempt(folder, owner, stop)
+
+
+def _attempt(folder: JobFolder, owner: Owner, stop: threading.Event) -> int:
+    status, message = FAILED, ""
+    try:
+        _compute(folder, owner, stop)
+        status = DONE
+    except StoppedError:
+        status = STOPPED
+    except FencedError as error:
+        status, message = FENCED, str(error)
+    except (AirlensError, SettingError) as error:
+        message = str(error)
+    except OSError as error:
+        status = NO_SPACE if error.errno in (errno.ENOSPC, errno.EDQUOT) else FAILED
+        message = f"{error.strerror}: {error.filename}. Nothing half-written was kept."
+    except MemoryError as error:
+        message = f"Not enough memory: {error}. Choose a smaller grid or batch, or a larger machine."
+    except Exception as error:
+        traceback.print_exc()
+        message = f"{type(error).__name__}: {error}. This is a defect; log.txt of the attempt has the trace."
+    if status != FENCED:
+        _say_goodbye(folder, owner, status, message)
+    return status
+
+
+def _compute(folder: JobFolder, owner: Owner, stop: threading.Event) -> None:
+    order = folder.order()
+    kind = kinds.load(order["kind"])
+    settings = kind.read(order["settings"])
+    output = folder.staging(owner.attempt)
+    inherit_checkpoint(folder, owner.attempt)
+    shutil.rmtree(output, ignore_errors=True)
+    make_folder(output)
+    experiment = Path(order["experiment"]) if order["experiment"] else None
+    task = Task(folder=folder, owner=owner, experiment=experiment, output=output, stop=stop)
+    try:
+        publish(task, kind.run(task, settings))
+    finally:
+        shutil.rmtree(output, ignore_errors=True)
+
+
+def _introduce(folder: JobFolder, owner: Owner) -> None:
+    process = psutil.Process()
+    content = {"pid": process.pid, "created_s": process.create_time(), "host": socket.gethostname()}
+    write_json(folder.attempt(owner.attempt) / "worker.json", content)
+
+
+def _say_goodbye(folder: JobFolder, owner: Owner, status: int, message: str) -> None:
+    """Leave exit.json; on a full disk there may be no room even for that: then the process just ends."""
+    content = {"status": status, "message": message}
+    try:
+        write_json(folder.attempt(owner.attempt) / "exit.json", content)
+    except OSError as error:
+        print(f"{message} (exit.json could not be written: {error})", file=sys.stderr)
+
+
+def _renew(folder: JobFolder, owner: Owner, lease_s: float) -> None:
+    """Renew the lease; end the process when a newer attempt owns the job or the folder is out of reach."""
+    count, failures = 0, 0
+    pause = threading.Event()
+    while True:
+        try:
+            folder.check(owner)
+            beat(folder.attempt(owner.attempt) / "heartbeat", count)
+            count, failures = count + 1, 0
+        except FencedError:
+            os._exit(FENCED)
+        except OSError as error:
+            # A full disk is no lost lease: the counter overwrites itself in place.
+            failures += error.errno not in (errno.ENOSPC, errno.EDQUOT)
+        if failures >= 8:
+            os._exit(FENCED)
+        pause.wait(lease_s / 8)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
