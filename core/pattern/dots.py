@@ -1,0 +1,34 @@
+"""Random dark dots on white, the classical background of schlieren by displacement."""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import oaconvolve
+
+from core.scene import DotPattern
+
+_EDGE_SAMPLES = 5
+
+
+def random_dots(pattern: DotPattern, rows: int, cols: int) -> Float[np.ndarray, "rows cols"]:
+    """Ink: 1 in a dot, 0 outside, anti-aliased at the rim. Dots fall independently and may overlap.
+
+    For a coverage c the number of dots is -ln(1 - c) / dot area per pixel, so that overlaps are paid for.
+    """
+    rng = np.random.default_rng(pattern.seed)
+    margin = int(np.ceil(pattern.diameter_px)) + 1
+    shape = (rows + 2 * margin, cols + 2 * margin)
+    area_px2 = np.pi / 4 * pattern.diameter_px**2
+    count = round(-np.log1p(-pattern.coverage) / area_px2 * shape[0] * shape[1])
+    centres = np.zeros(shape)
+    np.add.at(centres, tuple((rng.random((2, count)) * np.array(shape)[:, None]).astype(int)), 1.0)
+    ink = np.clip(oaconvolve(centres, _disc(pattern.diameter_px), mode="same"), 0.0, 1.0)
+    return ink[margin : margin + rows, margin : margin + cols]
+
+
+def _disc(diameter_px: float) -> Float[np.ndarray, "size size"]:
+    """Area of each pixel inside a disc, by supersampling."""
+    half = int(np.ceil(diameter_px / 2))
+    fine = (np.arange((2 * half + 1) * _EDGE_SAMPLES) + 0.5) / _EDGE_SAMPLES - (half + 0.5)
+    inside = (fine[:, None] ** 2 + fine[None] ** 2 <= diameter_px**2 / 4).astype(float)
+    size = 2 * half + 1
+    return inside.reshape(size, _EDGE_SAMPLES, size, _EDGE_SAMPLES).mean((1, 3))

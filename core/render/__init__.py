@@ -1,0 +1,7 @@
+"""Images of the back wall: pixel geometry, the pattern's shift, the pixel integral."""
+
+from core.render.geometry import PixelGeometry as PixelGeometry
+from core.render.geometry import pixel_geometry as pixel_geometry
+from core.render.image import render_flow as render_flow
+from core.render.image import render_reference as render_reference
+from core.render.light import pattern_size as pattern_size
