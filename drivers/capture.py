@@ -6,6 +6,7 @@ abort acts within a frame. Whatever ends a burst early, what was taken before is
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,8 +28,19 @@ from drivers.verdict import (
 )
 
 OnProgress = Callable[[Progress], object]
-OnFrame = Callable[[Frame, FrameRecord], object]
 Abort = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class Taken:
+    """One good frame, its record, and the moments with it in: for a raw stack or a checkpoint."""
+
+    frame: Frame
+    record: FrameRecord
+    moments: RunningMoments
+
+
+OnFrame = Callable[[Taken], object]
 
 
 def run_capture(
@@ -43,7 +55,7 @@ def run_capture(
 ) -> Burst:
     """Return the burst that `plan` asks for; `burst.outcome` says whether it is whole.
 
-    `on_frame` receives every good frame (for a raw stack); `rig_on_s` is how long the rig has been on.
+    `on_frame` receives every good frame; `rig_on_s` is how long the rig has been on.
     Raises DeviceSettingError when a setting is not granted, DeviceError when not even one frame came.
     """
     settings = _apply(camera, plan)
@@ -60,7 +72,7 @@ def run_capture(
         records.append(record)
         full_scale = frame.full_scale_counts
         if on_frame:
-            on_frame(frame, record)
+            on_frame(Taken(frame, record, moments))
         if on_progress:
             on_progress(Progress(len(records), plan.frames, taker.refused.total(), record.level))
     if not records and taker.lost is not None:

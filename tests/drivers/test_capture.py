@@ -21,7 +21,7 @@ def verdict(burst, name):
 def test_moments_are_those_of_the_stack():
     stack = []
     burst = run_capture(
-        make_camera(), CapturePlan(frames=12), on_frame=lambda frame, _: stack.append(frame.pixels)
+        make_camera(), CapturePlan(frames=12), on_frame=lambda taken: stack.append(taken.frame.pixels)
     )
     stack = np.stack(stack) / burst.full_scale_counts
     # float32 results of exact sums.
@@ -35,7 +35,7 @@ def test_bad_frames_are_counted_and_taken_again():
     faults = {5: CameraFault.DROP, 9: CameraFault.ERROR_FLAG, 11: CameraFault.SHORT, 15: CameraFault.STALL}
     camera = make_camera(faults=faults.get)
     stack = []
-    burst = run_capture(camera, CapturePlan(frames=20), on_frame=lambda frame, _: stack.append(frame))
+    burst = run_capture(camera, CapturePlan(frames=20), on_frame=lambda taken: stack.append(taken.frame))
     assert burst.frames == 20
     assert burst.refused == {"dropped": 1, "corrupt": 2, "missing": 1}
     for frame in stack:
