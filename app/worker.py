@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _attempt(folder: JobFolder, owner: Owner, stop: threading.Event) -> int:
     status, message = FAILED, ""
     try:
-        _compute(folder, owner, stop)
+        compute(folder, owner, stop)
         status = DONE
     except StoppedError:
         status = STOPPED
@@ -77,7 +77,11 @@ def _attempt(folder: JobFolder, owner: Owner, stop: threading.Event) -> int:
     return status
 
 
-def _compute(folder: JobFolder, owner: Owner, stop: threading.Event) -> None:
+def compute(folder: JobFolder, owner: Owner, stop: threading.Event) -> None:
+    """Run the computation from its last checkpoint and publish the result.
+
+    Raises StoppedError, FencedError, and whatever the computation raises.
+    """
     order = folder.order()
     kind = kinds.load(order["kind"])
     settings = kind.read(order["settings"])

@@ -1,9 +1,6 @@
 """`airlens jobs`: queue, watch, order, stop and go on with computations."""
 
 import json
-import logging
-import signal
-import threading
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +10,8 @@ from rich.console import Console
 from rich.table import Table
 
 from app.errors import BadInputError
-from app.jobs import Event, Job, JobSpec, JobState, Ledger, Supervisor, read_config
+from app.jobs import Event, Job, JobSpec, JobState, Ledger
+from app.jobs.__main__ import supervise
 
 Folder = Annotated[
     Path, typer.Option("--folder", envvar="AIRLENS_JOBS", help="The folder of the ledger and its jobs.")
@@ -34,11 +32,7 @@ def register(cli: typer.Typer) -> None:
 
 def run(folder: Folder = HERE) -> None:
     """Run the queue until interrupted; running jobs go on and are adopted by the next `run`."""
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s")
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
-    Supervisor(Ledger(folder), read_config(folder)).run(stop)
+    supervise(folder)
 
 
 def submit(
