@@ -3,7 +3,6 @@
 import contextlib
 import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
@@ -22,32 +21,35 @@ class LocalEngine:
 
     def __init__(self, cache: Path) -> None:
         self._cache = cache
-        self._children: dict[str, subprocess.Popen[bytes]] = {}
+        self._children: set[int] = set()
 
     def probe(self) -> None:
         """Nothing to check: the machine is here."""
 
     def start(self, launch: Launch) -> str:
         """Start the worker. Raises EngineError when the system refuses."""
-        log_path = JobFolder(launch.folder).attempt(launch.attempt) / "log.txt"
-        command = [sys.executable, *launch.worker_arguments]
+        self._reap()
+        log = str(JobFolder(launch.folder).attempt(launch.attempt) / "log.txt")
         try:
-            with open(log_path, "ab") as log:
-                child = subprocess.Popen(
-                    command,
-                    stdin=subprocess.DEVNULL,
-                    stdout=log,
-                    stderr=subprocess.STDOUT,
-                    env=_environment(launch.device, self._cache),
-                    start_new_session=True,
-                )
+            pid = os.posix_spawn(
+                sys.executable,
+                [sys.executable, *launch.worker_arguments],
+                _environment(launch.device, self._cache),
+                file_actions=[
+                    (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
+                    (os.POSIX_SPAWN_OPEN, 1, log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644),
+                    (os.POSIX_SPAWN_DUP2, 1, 2),
+                ],
+                setsid=True,
+                setsigmask=(),
+                setsigdef=(signal.SIGINT, signal.SIGTERM),
+            )
         except OSError as error:
             raise EngineError(
                 f"The worker could not be started: {error}. Free memory or disk space."
             ) from error
-        handle = f"{child.pid}:{_created_s(child.pid)}"
-        self._children[handle] = child
-        return handle
+        self._children.add(pid)
+        return f"{pid}:{_created_s(pid)}"
 
     def find(self, launch: Launch) -> str | None:
         """Return the handle that the worker left in its folder."""
@@ -56,10 +58,7 @@ class LocalEngine:
 
     def state(self, handle: str) -> ProcessState:
         """Say whether that very process lives; another one with the same number does not count."""
-        child = self._children.get(handle)
-        if child is not None and child.poll() is not None:
-            del self._children[handle]
-            return ProcessState.gone
+        self._reap()
         return ProcessState.gone if _process(handle) is None else ProcessState.running
 
     def stop(self, handle: str, *, kill: bool = False) -> None:
@@ -77,6 +76,14 @@ class LocalEngine:
         with contextlib.suppress(psutil.NoSuchProcess):
             return process.memory_info().rss if process else 0
         return 0
+
+    def _reap(self) -> None:
+        """Collect the children that ended; those that this process adopted are init's to collect."""
+        for pid in list(self._children):
+            with contextlib.suppress(ChildProcessError):
+                if os.waitpid(pid, os.WNOHANG) == (0, 0):
+                    continue
+            self._children.discard(pid)
 
 
 def _environment(device: str, cache: Path) -> dict[str, str]:

@@ -26,6 +26,7 @@ from app.jobs.records import Job
 from app.jobs.state import JobState
 
 _log = logging.getLogger(__name__)
+_FAREWELL_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class Supervisor:
         self._engine = create_engine(config, ledger.folder) if engine is None else engine
         self._dispatch = Dispatch(ledger)
         self._signs: dict[str, _Sign] = {}
+        self._ending: dict[tuple[str, int], float] = {}
         self._told: dict[str, tuple[int, bool]] = {}
 
     def run(self, stop: threading.Event) -> None:
@@ -89,7 +91,10 @@ class Supervisor:
         state = self._process_state(job, folder)
         self._dispatch.ingest(job, folder.attempt(job.attempt) / "events.jsonl")
         goodbye = read_json(folder.attempt(job.attempt) / "exit.json")
-        if folder.is_published():
+        is_published = folder.is_published()
+        if state is ProcessState.running and (is_published or goodbye is not None):
+            self._see_off(job)  # the device is free when the process is gone, not before
+        elif is_published:
             self._dispatch.conclude(job, JobState.done)
         elif goodbye is not None:
             self._part(job, goodbye["status"], goodbye["message"])
@@ -113,6 +118,13 @@ class Supervisor:
         except EngineError as error:
             _log.warning("%s", error)
             return ProcessState.unknown
+
+    def _see_off(self, job: Job) -> None:
+        """Let a worker that has finished end; one that hangs in its last moments is killed."""
+        since_s = self._ending.setdefault((job.id, job.attempt), time.monotonic())
+        if time.monotonic() - since_s > _FAREWELL_S and job.handle:
+            with contextlib.suppress(EngineError):
+                self._engine.stop(job.handle, kill=True)
 
     def _part(self, job: Job, status: int, message: str) -> None:
         """Decide what a worker's end means for its job."""
