@@ -25,7 +25,6 @@ from app.jobs.errors import FencedError
 from app.jobs.folder import JobFolder, Owner, beat, try_lock
 from app.jobs.task import StoppedError, Task, inherit_checkpoint, publish
 from app.jobs.worker_status import DONE, FAILED, FENCED, NO_SPACE, STOPPED, TAKEN
-from core.setting import SettingError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -62,19 +61,27 @@ def _attempt(folder: JobFolder, owner: Owner, stop: threading.Event) -> int:
         status = STOPPED
     except FencedError as error:
         status, message = FENCED, str(error)
-    except (AirlensError, SettingError) as error:
-        message = str(error)
     except OSError as error:
         status = NO_SPACE if error.errno in (errno.ENOSPC, errno.EDQUOT) else FAILED
         message = f"{error.strerror}: {error.filename}. Nothing half-written was kept."
     except MemoryError as error:
         message = f"Not enough memory: {error}. Choose a smaller grid or batch, or a larger machine."
     except Exception as error:
-        traceback.print_exc()
-        message = f"{type(error).__name__}: {error}. This is a defect; log.txt of the attempt has the trace."
+        message = _explain(error)
     if status != FENCED:
         _say_goodbye(folder, owner, status, message)
     return status
+
+
+def _explain(error: Exception) -> str:
+    """Return what the operator should read: a foreseen error says it itself, any other is a defect."""
+    # Imported here: the array library behind it is not needed before the computation begins.
+    from core.setting import SettingError
+
+    if isinstance(error, AirlensError | SettingError):
+        return str(error)
+    traceback.print_exception(error)
+    return f"{type(error).__name__}: {error}. This is a defect; log.txt of the attempt has the trace."
 
 
 def compute(folder: JobFolder, owner: Owner, stop: threading.Event) -> None:

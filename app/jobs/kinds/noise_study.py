@@ -9,42 +9,35 @@ Trial k draws from the seed (seed, k) alone, so a run that was interrupted gives
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from app.configuration import parse
+from app.configuration import Strict, parse
 from app.durable import durable_path
 from app.jobs.task import CheckpointClock, Task
-from core.setting import SettingError, setting
 
 EXPERIMENT = False
 
 
-@setting
-class NoiseStudy:
+class NoiseStudy(Strict):
     """`electrons` is the signal at full scale; a frame is the mean of `frames` exposures."""
 
-    electrons: float = 10000.0
-    read_noise_electrons: float = 3.0
-    frames: int = 1
-    shift_px: float = 0.05
-    window_px: int = 16
-    size_px: int = 128
-    trials: int = 200
-    seed: int = 0
+    electrons: float = Field(default=10000.0, gt=0)
+    read_noise_electrons: float = Field(default=3.0, ge=0)
+    frames: int = Field(default=1, ge=1)
+    shift_px: float = Field(default=0.05, ge=-1, le=1)
+    window_px: int = Field(default=16, ge=4)
+    size_px: int = Field(default=128, ge=32, le=2048)
+    trials: int = Field(default=200, ge=1)
+    seed: int = Field(default=0, ge=0)
 
-    def __post_init__(self) -> None:
-        """Raise SettingError for values without meaning."""
-        if (
-            min(self.electrons, self.frames, self.trials, self.window_px) <= 0
-            or self.read_noise_electrons < 0
-        ):
-            raise SettingError("Electrons, frames, trials and window must be above 0, read noise not below.")
-        if self.size_px % self.window_px or not 16 <= self.size_px <= 2048:
-            raise SettingError(
-                f"size_px is {self.size_px}: make it a multiple of window_px ({self.window_px}), 16 to 2048."
-            )
+    @model_validator(mode="after")
+    def _whole_windows(self) -> Self:
+        if self.size_px % self.window_px:
+            raise ValueError(f"size_px is {self.size_px}: make it a multiple of window_px ({self.window_px})")
+        return self
 
 
 def read(settings: Mapping[str, Any]) -> NoiseStudy:
@@ -83,7 +76,7 @@ def run(task: Task, study: NoiseStudy) -> dict[str, Any]:
     np.save(task.output / "mean_px.npy", mean_px)
     np.save(task.output / "variance_px2.npy", sums.square_px2 / study.trials - mean_px**2)
     return {
-        "settings": asdict(study),
+        "settings": study.model_dump(),
         "scatter_px": sums.scatter_px(),
         "stated_scatter_px": float(np.sqrt(np.mean(sums.stated_px2 / study.trials))),
         "bias_px": float(np.mean(mean_px[:, 0]) - study.shift_px),

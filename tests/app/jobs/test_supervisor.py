@@ -161,7 +161,7 @@ def test_a_failure_is_told_in_words_and_not_tried_again(ledger: Ledger):
     order.write_text(order.read_text().replace('"trials": 10', '"trials": -10'))
     with Running(ledger):
         until_state(ledger, job, JobState.failed)
-    assert "above 0" in ledger.get(job.id).reason
+    assert "greater than or equal to 1" in ledger.get(job.id).reason
 
 
 def _lock(ledger: Ledger, job: Job, attempt: int) -> Path:
