@@ -57,7 +57,7 @@ class Pinhole(eqx.Module):
         if not self.distorted:
             return distorted
 
-        def step(_: int, plane: Float[Array, "2"]) -> Float[Array, "2"]:
+        def step(_: Array, plane: Float[Array, "2"]) -> Float[Array, "2"]:
             (a, b), (c, d) = jax.jacfwd(self._distort)(plane)
             ex, ey = self._distort(plane) - distorted
             return plane - jnp.stack([d * ex - b * ey, a * ey - c * ex]) / (a * d - b * c)
