@@ -6,6 +6,7 @@ every page that was written can be read, which a plain HDF5 file does not offer.
 
 import json
 import os
+import struct
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -81,9 +82,16 @@ class RawStack:
 
 
 def read_raw_stack(path: Path) -> tuple[list[Pixels], list[FrameRecord]]:
-    """Return the frames and records of a raw stack, also of one that a crash cut short."""
+    """Return the frames and records of a raw stack; of one that a crash cut short, those before the cut."""
+    frames: list[Pixels] = []
+    records: list[FrameRecord] = []
     with tifffile.TiffFile(path) as file:
-        pages = [page for page in file.pages if isinstance(page, tifffile.TiffPage) or page is not None]
-        frames = [page.asarray() for page in pages]
-        records = [FrameRecord(**json.loads(page.aspage().description)) for page in pages]
+        try:
+            for page in file.pages:
+                record = FrameRecord(**json.loads(page.aspage().description))
+                frames.append(page.asarray())
+                records.append(record)
+        except (ValueError, TypeError, KeyError, struct.error, tifffile.TiffFileError):
+            # The page that was being written when the process died: everything before it is whole.
+            return frames, records
     return frames, records

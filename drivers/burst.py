@@ -66,11 +66,11 @@ class FrameRecord:
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting as asked for, and as the device has it."""
+    """A setting as asked for, and as the device has it (None: it has no such control)."""
 
     name: str
     asked: float | None
-    granted: float
+    granted: float | None
 
 
 @dataclass(frozen=True)

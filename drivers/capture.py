@@ -135,9 +135,11 @@ def _apply(camera: Camera, plan: CapturePlan) -> tuple[Setting, ...]:
         Setting("gain", plan.gain, camera.gain),
     )
     for one in settings:
-        if one.asked is not None and abs(one.granted - one.asked) > 0.01 * abs(one.asked) + 1e-4:
+        if one.asked is None:
+            continue
+        if one.granted is None or abs(one.granted - one.asked) > 0.01 * abs(one.asked) + 1e-4:
             raise DeviceSettingError(
-                f"{one.name} is {one.granted:g} after {one.asked:g} was asked for. "
+                f"{one.name} is {one.granted} after {one.asked:g} was asked for. "
                 "Choose a value that the camera has, and switch its automatic control off."
             )
     return settings
@@ -194,7 +196,7 @@ def _judge_records(
         judge_flicker([record.level for record in records]),
         judge_refused(refused, len(records)),
     ]
-    if plan.refresh_hz is not None:
+    if plan.refresh_hz is not None and exposure_s is not None:
         verdicts.append(judge_beat(exposure_s, plan.refresh_hz))
     if rig_on_s is not None:
         verdicts.append(judge_warm_up(rig_on_s, plan.warm_up_s))

@@ -52,9 +52,10 @@ class FrameGate:
         With `consecutive`, frames lost since the last one are an error too.
         """
         last = self._last
-        if last is None or arrival.sequence > last.sequence:
+        steps = 1 if last is None else _steps(last.sequence, arrival.sequence)
+        if steps > 0:
             self._last = arrival
-        if arrival.flagged or arrival.bytes_used != self._expected_bytes:
+        if arrival.flagged or arrival.bytes_used < self._expected_bytes:
             self._refuse(
                 FrameFault.CORRUPT,
                 f"Frame {arrival.sequence} is corrupt (error flag {arrival.flagged}, {arrival.bytes_used} of "
@@ -62,7 +63,6 @@ class FrameGate:
             )
         if last is None:
             return
-        steps = arrival.sequence - last.sequence
         elapsed_s = arrival.exposed_s - last.exposed_s
         if steps <= 0 or elapsed_s <= 0:
             self._refuse(
@@ -87,3 +87,8 @@ class FrameGate:
     def _refuse(self, fault: FrameFault, message: str, lost: int = 1) -> None:
         self.refused[fault] += lost
         raise FrameError(message, fault, lost)
+
+
+def _steps(before: int, after: int) -> int:
+    """Return how far a 32-bit frame counter went, across its wrap too."""
+    return (after - before + 2**31) % 2**32 - 2**31

@@ -44,16 +44,16 @@ class Camera(Protocol):
         ...
 
     @property
-    def exposure_s(self) -> float:
-        """Exposure time, read back from the device."""
+    def exposure_s(self) -> float | None:
+        """Exposure time, read back from the device; None when it has no such control."""
         ...
 
     @exposure_s.setter
     def exposure_s(self, value: float) -> None: ...
 
     @property
-    def gain(self) -> float:
-        """Gain in the driver's own unit, read back from the device."""
+    def gain(self) -> float | None:
+        """Gain in the driver's own unit, read back from the device; None when it has no such control."""
         ...
 
     @gain.setter

@@ -77,15 +77,16 @@ def judge_level(mean: Float32[np.ndarray, "rows cols"]) -> Verdict:
     return _judge_level(float(mean.mean()))
 
 
-def judge_saturation(saturated: Sequence[float], exposure_s: float) -> Verdict:
+def judge_saturation(saturated: Sequence[float], exposure_s: float | None) -> Verdict:
     """Return the verdict on saturated pixels: the largest part of any frame counts."""
     worst = max(saturated, default=0.0)
+    now = "" if exposure_s is None else f" of {exposure_s:g} s"
     return Verdict(
         "saturation",
         worst <= MAX_SATURATED,
         worst,
         f"at most {MAX_SATURATED:g} of the pixels at full scale",
-        f"Shorten the exposure of {exposure_s:g} s or close the aperture; a saturated pixel has no shift.",
+        f"Shorten the exposure{now} or close the aperture; a saturated pixel has no shift.",
     )
 
 

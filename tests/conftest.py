@@ -1,6 +1,11 @@
-"""Strict JAX for every test: ranks and dtypes never promote silently."""
+"""Strict JAX for every test: ranks and dtypes never promote silently. Options name real devices."""
 
 import jax
 
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+
+def pytest_addoption(parser):
+    parser.addoption("--camera", help="a V4L2 device for the hardware half of the camera contract")
+    parser.addoption("--projector", help="URL of a projector for the hardware half of its contract")

@@ -51,7 +51,7 @@ class SimulatedCamera:
         self._clock, self._faults = clock or VirtualClock(), faults
         self._luminance = view()
         self._expected: tuple[object, ExpectedCounts] | None = None
-        self._threads = ThreadPoolExecutor(min(4, os.cpu_count() or 1), "simulated-camera")
+        self._threads: ThreadPoolExecutor | None = None
         self._start()
 
     @property
@@ -108,13 +108,14 @@ class SimulatedCamera:
         return self._receive(None)
 
     def reconnect(self) -> None:
-        """Open again after an unplug."""
-        self._gone = False
+        """Open again after an unplug or a close."""
         self._start()
 
     def close(self) -> None:
         """Free the threads."""
-        self._threads.shutdown()
+        if self._threads is not None:
+            self._threads.shutdown()
+        self._threads = None
 
     def __enter__(self) -> "SimulatedCamera":
         return self
@@ -184,5 +185,8 @@ class SimulatedCamera:
             factor = self._exposure_s / self._full_well_exposure_s
             self._expected = key, ExpectedCounts.of(moved, self._noise, factor, self._gain)
             self._luminance = luminance  # held, so that its id is not given to another array
-        threads = self._threads if luminance.size >= _THREADED_FROM_PX else None
-        return self._expected[1].draw(self._seed, index, threads)
+        if luminance.size < _THREADED_FROM_PX:
+            return self._expected[1].draw(self._seed, index)
+        if self._threads is None:
+            self._threads = ThreadPoolExecutor(min(4, os.cpu_count() or 1), "simulated-camera")
+        return self._expected[1].draw(self._seed, index, self._threads)
