@@ -1,0 +1,147 @@
+"""Turbulence closures: what stands for the motion that a room grid cannot hold.
+
+    constant       nu_t given (momentum and heat)
+    zero_equation  nu_t = 0.03874 |u| l, l the distance to the nearest wall   (Chen and Xu 1998)
+    k_epsilon      standard constants with wall functions                     (Launder and Spalding 1974)
+
+Each holds a state of its own (nothing, or k and epsilon), advances it, and says the effective viscosity
+in the cells and on the walls. k-epsilon has no buoyancy term in k and epsilon.
+"""
+
+import abc
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from core.room.boundary import Boundary
+from core.room.grid import AXES, Cells, RoomGrid, Velocity, face_mean, first_plane, last_plane
+from core.room.k_epsilon import KEpsilonState, advance, energy_walls
+from core.room.momentum import Viscosity
+
+MOLECULAR_PRANDTL = 0.71
+
+
+class AbstractClosure(eqx.Module):
+    """A closure; `start` makes its state from a mixing length and a speed."""
+
+    @abc.abstractmethod
+    def start(self, grid: RoomGrid, speed_m_s: float) -> KEpsilonState | None:
+        """The state of air at rest that is about to be stirred at `speed_m_s`."""
+
+    @abc.abstractmethod
+    def advance(
+        self,
+        state: KEpsilonState | None,
+        velocity: Velocity,
+        boundary: Boundary,
+        grid: RoomGrid,
+        dt_s: Float[Array, ""],
+    ) -> KEpsilonState | None:
+        """The state after `dt_s`."""
+
+    @abc.abstractmethod
+    def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
+        """Effective viscosity, molecular part included."""
+
+
+class ConstantClosure(AbstractClosure):
+    """One eddy viscosity everywhere, on walls too; zero for laminar flow."""
+
+    eddy_m2_s: Float[Array, ""]
+    molecular_m2_s: Float[Array, ""]
+
+    def start(self, grid: RoomGrid, speed_m_s: float) -> KEpsilonState | None:
+        """No state."""
+        return None
+
+    def advance(
+        self,
+        state: KEpsilonState | None,
+        velocity: Velocity,
+        boundary: Boundary,
+        grid: RoomGrid,
+        dt_s: Float[Array, ""],
+    ) -> KEpsilonState | None:
+        """No state."""
+        return None
+
+    def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
+        """The constant."""
+        return _same_on_walls(jnp.full(grid.cells, 1.0) * (self.eddy_m2_s + self.molecular_m2_s))
+
+
+class ZeroEquationClosure(AbstractClosure):
+    """Chen and Xu (1998): local speed times wall distance; `scale` multiplies their 0.03874."""
+
+    wall_distance_m: Cells
+    scale: Float[Array, ""]
+    molecular_m2_s: Float[Array, ""]
+
+    def start(self, grid: RoomGrid, speed_m_s: float) -> KEpsilonState | None:
+        """No state."""
+        return None
+
+    def advance(
+        self,
+        state: KEpsilonState | None,
+        velocity: Velocity,
+        boundary: Boundary,
+        grid: RoomGrid,
+        dt_s: Float[Array, ""],
+    ) -> KEpsilonState | None:
+        """No state."""
+        return None
+
+    def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
+        """0.03874 |u| l plus the molecular one."""
+        u, v, w = (face_mean(velocity[a], a) for a in AXES)
+        speed = jnp.sqrt(u**2 + v**2 + w**2)
+        return _same_on_walls(0.03874 * self.scale * speed * self.wall_distance_m + self.molecular_m2_s)
+
+
+class KEpsilonClosure(AbstractClosure):
+    """Standard k-epsilon; `scale` multiplies C_mu's viscosity in the cells."""
+
+    scale: Float[Array, ""]
+    molecular_m2_s: Float[Array, ""]
+
+    def start(self, grid: RoomGrid, speed_m_s: float) -> KEpsilonState | None:
+        """k from 10 % of the speed, epsilon so that nu_t is 30 times the molecular viscosity."""
+        k = jnp.full(grid.cells, 1.5 * (0.1 * speed_m_s) ** 2, jnp.float32)
+        return KEpsilonState(k, 0.09 * k**2 / (30.0 * self.molecular_m2_s))
+
+    def advance(
+        self,
+        state: KEpsilonState | None,
+        velocity: Velocity,
+        boundary: Boundary,
+        grid: RoomGrid,
+        dt_s: Float[Array, ""],
+    ) -> KEpsilonState | None:
+        """One step of both equations."""
+        if state is None:
+            return None
+        return advance(state, velocity, boundary, grid, dt_s, self.molecular_m2_s, self.scale)
+
+    def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
+        """C_mu k^2 / epsilon, and the log law on walls."""
+        if state is None:
+            return _same_on_walls(jnp.full(grid.cells, 1.0) * self.molecular_m2_s)
+        cells = self.scale * state.eddy_m2_s() + self.molecular_m2_s
+        return Viscosity(cells, energy_walls(state.energy_m2_s2, grid, self.molecular_m2_s))
+
+
+def wall_distance_m(grid: RoomGrid) -> Cells:
+    """Distance of each cell centre to the nearest wall of the box."""
+    distance = jnp.full(grid.cells, jnp.inf, jnp.float32)
+    for a in AXES:
+        centres = (jnp.arange(grid.cells[a], dtype=jnp.float32) + 0.5) * grid.spacing_m[a]
+        nearest = jnp.minimum(centres, grid.cells[a] * grid.spacing_m[a] - centres)
+        distance = jnp.minimum(distance, nearest.reshape([-1 if b == a else 1 for b in AXES]))
+    return distance
+
+
+def _same_on_walls(cells_m2_s: Cells) -> Viscosity:
+    walls = tuple((first_plane(cells_m2_s, a), last_plane(cells_m2_s, a)) for a in AXES)
+    return Viscosity(cells_m2_s, walls)

@@ -1,0 +1,89 @@
+"""The room as a staggered grid of cells: pressure and temperature in the cells, velocity on their faces.
+
+Harlow and Welch (1965). `velocity[a]` holds the component along axis a on the faces normal to a, so it
+is one longer than the cells along a; its first and last planes are the walls.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array, Float
+
+from core.geometry import Box
+
+AXES = (0, 1, 2)
+WALLS = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
+
+Cells = Float[Array, "nx ny nz"]
+Velocity = tuple[Float[Array, "nx1 ny nz"], Float[Array, "nx ny1 nz"], Float[Array, "nx ny nz1"]]
+
+
+class RoomGrid(eqx.Module):
+    """Uniform cells filling a box."""
+
+    cells: tuple[int, int, int] = eqx.field(static=True)
+    lower_m: tuple[float, float, float] = eqx.field(static=True)
+    spacing_m: tuple[float, float, float] = eqx.field(static=True)
+
+    @property
+    def volume_m3(self) -> float:
+        """Volume of one cell."""
+        return float(np.prod(self.spacing_m))
+
+    def face_area_m2(self, axis: int) -> float:
+        """Area of one cell face normal to `axis`."""
+        return self.volume_m3 / self.spacing_m[axis]
+
+    def plane(self, axis: int) -> tuple[int, int]:
+        """Cells along the two other axes."""
+        first, second = (a for a in AXES if a != axis)
+        return self.cells[first], self.cells[second]
+
+    def faces_m(self, axis: int) -> Float[np.ndarray, " faces"]:
+        """Coordinates of the faces normal to `axis`, both walls included."""
+        return self.lower_m[axis] + self.spacing_m[axis] * np.arange(self.cells[axis] + 1)
+
+    def centres_m(self, axis: int) -> Float[np.ndarray, " cells"]:
+        """Coordinates of the cell centres."""
+        return self.lower_m[axis] + self.spacing_m[axis] * (np.arange(self.cells[axis]) + 0.5)
+
+
+def room_grid(room: Box, cells: int) -> RoomGrid:
+    """Nearly cubic cells, about cells^3 of them, and at least 4 along every axis."""
+    edge = float(np.prod(room.size_m)) ** (1 / 3) / cells
+    nx, ny, nz = (max(4, round(size / edge)) for size in room.size_m)
+    lx, ly, lz = room.size_m
+    return RoomGrid(cells=(nx, ny, nz), lower_m=room.lower_m, spacing_m=(lx / nx, ly / ny, lz / nz))
+
+
+def cut(field: Float[Array, "..."], start: int, stop: int, axis: int) -> Float[Array, "..."]:
+    """`field[start : n + stop]` along one axis; `stop` counts from the end (0 is all)."""
+    return lax.slice_in_dim(field, start, field.shape[axis] + stop, axis=axis)
+
+
+def face_mean(field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
+    """Mean of neighbours along `axis`: one shorter."""
+    return 0.5 * (cut(field, 0, -1, axis) + cut(field, 1, 0, axis))
+
+
+def difference(field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
+    """Forward difference along `axis`: one shorter."""
+    return cut(field, 1, 0, axis) - cut(field, 0, -1, axis)
+
+
+def with_walls(
+    low: Float[Array, "..."], inner: Float[Array, "..."], high: Float[Array, "..."], axis: int
+) -> Float[Array, "..."]:
+    """`inner` between two wall planes, given without the axis."""
+    return jnp.concatenate([jnp.expand_dims(low, axis), inner, jnp.expand_dims(high, axis)], axis)
+
+
+def first_plane(field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
+    """The plane next to the lower wall."""
+    return lax.index_in_dim(field, 0, axis, keepdims=False)
+
+
+def last_plane(field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
+    """The plane next to the upper wall."""
+    return lax.index_in_dim(field, field.shape[axis] - 1, axis, keepdims=False)

@@ -1,0 +1,138 @@
+"""The k-epsilon model on cells, with wall functions (Launder and Spalding 1974).
+
+    dk/dt   + u.grad k   = div((nu + nu_t) grad k)         + G - epsilon
+    deps/dt + u.grad eps = div((nu + nu_t / 1.3) grad eps) + (1.44 G - 1.92 eps) eps / k
+    nu_t = 0.09 k^2 / eps,   G = 2 nu_t S:S
+
+Beside walls, y the distance of the first cell's centre: eps = C^(3/4) k^(3/2) / (kappa y) is set,
+G = nu_w |u| / y C^(1/4) sqrt(k) / (kappa y), nu_w = nu y+ kappa / ln(E y+), averaged over the walls that a
+cell touches. Sources are taken implicitly, so both stay positive at any step. First-order upwind.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from core.room.boundary import Boundary
+from core.room.grid import (
+    AXES,
+    Cells,
+    RoomGrid,
+    Velocity,
+    cut,
+    difference,
+    face_mean,
+    first_plane,
+    last_plane,
+)
+from core.room.transport import add_to_walls, scalar_rate
+
+C_MU, C_1, C_2, SIGMA_EPSILON = 0.09, 1.44, 1.92, 1.3
+KAPPA, WALL_E, LAMINAR_Y_PLUS = 0.41, 9.8, 11.53
+SMALLEST_K, SMALLEST_EPSILON = 1e-9, 1e-12
+
+
+class KEpsilonState(eqx.Module):
+    """Turbulent energy and its dissipation."""
+
+    energy_m2_s2: Cells
+    dissipation_m2_s3: Cells
+
+    def eddy_m2_s(self) -> Cells:
+        """nu_t."""
+        return C_MU * self.energy_m2_s2**2 / self.dissipation_m2_s3
+
+
+def advance(
+    state: KEpsilonState,
+    velocity: Velocity,
+    boundary: Boundary,
+    grid: RoomGrid,
+    dt_s: Float[Array, ""],
+    molecular_m2_s: Float[Array, ""],
+    scale: Float[Array, ""],
+) -> KEpsilonState:
+    """k and epsilon after `dt_s`."""
+    k, epsilon = state.energy_m2_s2, state.dissipation_m2_s3
+    eddy = scale * state.eddy_m2_s()
+    production = eddy * strain_squared(velocity, grid)
+    touched, wall_production, wall_epsilon = wall_sources(k, velocity, grid, molecular_m2_s)
+    production = jnp.where(touched > 0, wall_production, production)
+    inflow_k = tuple(
+        (low.turbulent_energy_m2_s2, high.turbulent_energy_m2_s2) for low, high in boundary.walls
+    )
+    inflow_e = tuple((low.dissipation_m2_s3, high.dissipation_m2_s3) for low, high in boundary.walls)
+    k_rate = scalar_rate(k, inflow_k, velocity, molecular_m2_s + eddy, boundary, grid, limited=False)
+    e_rate = scalar_rate(
+        epsilon, inflow_e, velocity, molecular_m2_s + eddy / SIGMA_EPSILON, boundary, grid, limited=False
+    )
+    frequency = epsilon / k
+    new_k = (k + dt_s * (k_rate + production)) / (1.0 + dt_s * frequency)
+    new_e = (epsilon + dt_s * (e_rate + C_1 * production * frequency)) / (1.0 + dt_s * C_2 * frequency)
+    new_e = jnp.where(touched > 0, wall_epsilon, new_e)
+    return KEpsilonState(jnp.maximum(new_k, SMALLEST_K), jnp.maximum(new_e, SMALLEST_EPSILON))
+
+
+def strain_squared(velocity: Velocity, grid: RoomGrid) -> Cells:
+    """2 S:S in the cells; cross gradients from velocities averaged to cells."""
+    total = sum(2.0 * (difference(velocity[a], a) / grid.spacing_m[a]) ** 2 for a in AXES)
+    cells = [face_mean(velocity[a], a) for a in AXES]
+    for a, b in ((0, 1), (0, 2), (1, 2)):
+        total = total + (_central(cells[a], b, grid) + _central(cells[b], a, grid)) ** 2
+    return jnp.asarray(total)
+
+
+def wall_sources(
+    k: Cells, velocity: Velocity, grid: RoomGrid, molecular_m2_s: Float[Array, ""]
+) -> tuple[Float[np.ndarray, "nx ny nz"], Cells, Cells]:
+    """Number of walls that each cell touches, and there the production and epsilon."""
+    cells = [face_mean(velocity[a], a) for a in AXES]
+    touched = walls_touched(grid)
+    production, epsilon = jnp.zeros_like(k), jnp.zeros_like(k)
+    walls = energy_walls(k, grid, molecular_m2_s)
+    for a in AXES:
+        y = 0.5 * grid.spacing_m[a]
+        parts = []
+        for side, nearest in enumerate((first_plane, last_plane)):
+            b, c = (other for other in AXES if other != a)
+            speed = jnp.sqrt(nearest(cells[b], a) ** 2 + nearest(cells[c], a) ** 2 + 1e-12)
+            root = jnp.sqrt(nearest(k, a))
+            rate = C_MU**0.25 * root / (KAPPA * y)
+            parts.append((walls[a][side] * speed / y * rate, C_MU**0.75 * root**3 / (KAPPA * y)))
+        production = add_to_walls(production, parts[0][0], parts[1][0], a)
+        epsilon = add_to_walls(epsilon, parts[0][1], parts[1][1], a)
+    weight = 1.0 / np.maximum(touched, 1.0)
+    return touched, production * weight, epsilon * weight
+
+
+def energy_walls(
+    k: Cells, grid: RoomGrid, molecular_m2_s: Float[Array, ""]
+) -> tuple[tuple[Float[Array, "..."], Float[Array, "..."]], ...]:
+    """Viscosity on the walls by the log law from k beside them (low, high an axis)."""
+    walls = []
+    for a in AXES:
+        y = 0.5 * grid.spacing_m[a]
+        sides = []
+        for nearest in (first_plane, last_plane):
+            y_plus = C_MU**0.25 * jnp.sqrt(nearest(k, a)) * y / molecular_m2_s
+            log_law = y_plus * KAPPA / jnp.log(jnp.maximum(WALL_E * y_plus, 2.0))
+            sides.append(molecular_m2_s * jnp.where(y_plus > LAMINAR_Y_PLUS, log_law, 1.0))
+        walls.append((sides[0], sides[1]))
+    return tuple(walls)
+
+
+def walls_touched(grid: RoomGrid) -> Float[np.ndarray, "nx ny nz"]:
+    """How many walls each cell lies against."""
+    touched = np.zeros(grid.cells, np.float32)
+    for a in AXES:
+        for plane in (0, -1):
+            touched[tuple(plane if b == a else slice(None) for b in AXES)] += 1.0
+    return touched
+
+
+def _central(cells: Cells, axis: int, grid: RoomGrid) -> Cells:
+    """Central difference along `axis`, one-sided beside walls."""
+    edge = [(1, 1) if a == axis else (0, 0) for a in AXES]
+    padded = jnp.pad(cells, edge, mode="edge")
+    return (cut(padded, 2, 0, axis) - cut(padded, 0, -2, axis)) / (2.0 * grid.spacing_m[axis])

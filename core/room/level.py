@@ -1,0 +1,61 @@
+"""The room's temperature level, found by heat balance of its layers instead of by waiting.
+
+Jets settle in under a minute; the level of the temperature takes the room's time constant, a quarter of
+an hour. The heat equation is linear in T: summed over horizontal layers it is a small matrix A of the
+exchange between layers (mass flow both ways, diffusion) and with walls and outlets. A room that still
+warms at the rate r will have warmed by about A^-1 r. One coarse Newton step, the aggregation of
+algebraic multigrid; its fixed point is the steady state, for which r = 0.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from core.room.grid import AXES, Cells, cut, face_mean
+from core.room.model import Flow, RoomModel
+
+
+def level_correction(flow: Flow, warming_k_s: Cells, model: RoomModel, ahead_s: float) -> Float[Array, " nz"]:
+    """What to add to the temperature of each layer [K] when the room warms by `warming_k_s`.
+
+    The uniform part goes all the way; differences between layers, which internal waves disturb, go as far
+    as they would in `ahead_s` (implicit Euler).
+    """
+    exchange = layer_exchange_m3_s(flow, model)
+    volume = model.grid.volume_m3
+    source = warming_k_s.sum((0, 1)) * volume
+    lost = exchange.sum(1)
+    # A room that loses no heat has no level: one air change an hour keeps its correction finite.
+    leak = volume * warming_k_s.size / 3600.0
+    uniform = source.sum() / (lost.sum() + leak)
+    layer_m3 = volume * warming_k_s.shape[0] * warming_k_s.shape[1]
+    implicit = exchange + jnp.eye(exchange.shape[0]) * (layer_m3 / ahead_s)
+    return uniform + jnp.linalg.solve(implicit, source - lost * uniform)
+
+
+def layer_exchange_m3_s(flow: Flow, model: RoomModel) -> Float[Array, "nz nz"]:
+    """A: heat that leaves each layer per kelvin of every layer, over rho c."""
+    grid = model.grid
+    inner = cut(flow.velocity[2], 1, -1, 2)
+    diffusive = face_mean(model.diffusivity_m2_s(model.viscosity(flow)), 2) / grid.spacing_m[2]
+    area = grid.face_area_m2(2)
+    up = (jnp.maximum(inner, 0.0) + diffusive).sum((0, 1)) * area
+    down = (jnp.maximum(-inner, 0.0) + diffusive).sum((0, 1)) * area
+    nothing = jnp.zeros(1)
+    own = jnp.concatenate([up, nothing]) + jnp.concatenate([nothing, down]) + _lost_m3_s(model)
+    return jnp.diag(own) - jnp.diag(up, -1) - jnp.diag(down, 1)
+
+
+def _lost_m3_s(model: RoomModel) -> Float[Array, " nz"]:
+    """Outflow and wall conductance of each layer."""
+    grid = model.grid
+    lost = jnp.zeros(grid.cells[2])
+    for a in AXES:
+        area = grid.face_area_m2(a)
+        for side, wall in enumerate(model.boundary.walls[a]):
+            outward = jnp.maximum(-wall.normal_m_s if side == 0 else wall.normal_m_s, 0.0)
+            leaving = (outward + wall.conductance_m_s) * area
+            if a == 2:
+                lost = lost.at[0 if side == 0 else -1].add(leaving.sum())
+            else:
+                lost = lost + leaving.sum(0)
+    return lost

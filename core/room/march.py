@@ -1,0 +1,156 @@
+"""March a room to its steady state: chunks of jitted steps, the step length between them, a running mean.
+
+The march ends when the mean flow of one window differs from the window before by less than `tolerance`
+(relative rms of velocity), or at `longest_s`. What is returned is the mean over the last third of the
+model time: coarse grids hold slow oscillations that a steady truth has not. If a value becomes infinite
+the march goes back to the last window and halves the Courant number, once.
+"""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import lax
+from jaxtyping import Array, Bool, Float
+
+from core.result import Outcome
+from core.room.grid import Cells
+from core.room.level import level_correction
+from core.room.model import Flow, RoomModel, longest_step_s, two_steps
+from core.setting import SettingError, setting
+
+
+@setting
+class MarchSettings:
+    """How long and how finely to march.
+
+    `level_ahead_s`: how far each window's heat balance is carried ahead (0 leaves the level of the
+    temperature to time); it begins after `settle_s` and ends with the first two thirds.
+    """
+
+    longest_s: float = 60.0
+    window_s: float = 5.0
+    tolerance: float = 0.02
+    courant: float = 0.45
+    level_ahead_s: float = 20.0
+    settle_s: float = 15.0
+    chunk_steps: int = 20
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.courant <= 0.5:
+            raise SettingError(
+                f"Courant number {self.courant:g}; the explicit march is stable from 0 to 0.5. "
+                "Lower courant, or leave it at its default."
+            )
+        if self.longest_s < self.window_s or self.window_s <= 0:
+            raise SettingError(
+                f"A march of {self.longest_s:g} s cannot be watched in windows of {self.window_s:g} s; "
+                "give window_s above 0 and at most longest_s."
+            )
+
+
+class March(eqx.Module):
+    """The end of a march: last state, mean of the last third, how it ended, model time and steps."""
+
+    last: Flow
+    mean: Flow
+    outcome: Outcome = eqx.field(static=True)
+    model_s: float = eqx.field(static=True)
+    steps: int = eqx.field(static=True)
+    change: float = eqx.field(static=True)
+
+
+def march(
+    flow: Flow,
+    model: RoomModel,
+    settings: MarchSettings,
+    *,
+    on_window: Callable[[dict[str, float]], None] | None = None,
+) -> March:
+    """The steady flow that `flow` settles to."""
+    windows: list[Flow] = []
+    seconds = settings.window_s
+    courant, model_s, steps, change = settings.courant, 0.0, 0, float("inf")
+    outcome = Outcome.step_limit
+    while model_s < settings.longest_s - 1e-6:
+        start = flow
+        mean, new, taken = _window(start, model, settings, courant)
+        if not bool(_finite(new)):
+            if courant < settings.courant:
+                outcome = Outcome.nonfinite
+                break
+            courant *= 0.5
+            continue
+        model_s, steps = model_s + seconds, steps + taken
+        change = float(_relative_change(mean, windows[-1])) if windows else float("inf")
+        windows.append(mean)
+        if on_window is not None:
+            on_window({"model_s": model_s, "steps": float(steps), "change": change})
+        flow = new
+        if change < settings.tolerance:
+            outcome = Outcome.converged
+            break
+        if settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
+            flow = _levelled(new, (new.excess_k - start.excess_k) / seconds, model, settings.level_ahead_s)
+    mean = _mean(windows[-max(1, round(len(windows) / 3)) :]) if windows else flow
+    return March(flow, mean, outcome, model_s, steps, change)
+
+
+def _window(flow: Flow, model: RoomModel, settings: MarchSettings, courant: float) -> tuple[Flow, Flow, int]:
+    """Mean over one window, the state at its end, and the steps taken."""
+    left_s, means, weights = settings.window_s, [], []
+    while left_s > 1e-9:
+        stable_s = float(_longest_step_s(flow, model, courant))
+        if not stable_s > 1e-9:
+            break
+        dt_s = min(stable_s, left_s / (2 * settings.chunk_steps))
+        flow, mean = advance_chunk(flow, model, jnp.float32(dt_s), settings.chunk_steps)
+        means.append(mean)
+        weights.append(dt_s)
+        left_s -= 2 * settings.chunk_steps * dt_s
+    if not means:
+        return flow, eqx.tree_at(lambda f: f.excess_k, flow, flow.excess_k * jnp.nan), 0
+    return _mean(means, weights), flow, 2 * settings.chunk_steps * len(means)
+
+
+@eqx.filter_jit
+def advance_chunk(flow: Flow, model: RoomModel, dt_s: Float[Array, ""], pairs: int) -> tuple[Flow, Flow]:
+    """The flow after `pairs` pairs of steps, and its mean over them."""
+
+    def body(carry: tuple[Flow, Flow], _: None) -> tuple[tuple[Flow, Flow], None]:
+        flow, total = carry
+        flow = two_steps(flow, model, dt_s)
+        return (flow, jax.tree.map(jnp.add, total, flow)), None
+
+    zero = jax.tree.map(jnp.zeros_like, flow)
+    (flow, total), _ = lax.scan(body, (flow, zero), length=pairs)
+    return flow, jax.tree.map(lambda leaf: leaf / pairs, total)
+
+
+_longest_step_s = eqx.filter_jit(longest_step_s)
+
+
+@eqx.filter_jit
+def _levelled(flow: Flow, warming_k_s: Cells, model: RoomModel, ahead_s: float) -> Flow:
+    shift = level_correction(flow, warming_k_s, model, ahead_s)
+    return eqx.tree_at(lambda f: f.excess_k, flow, flow.excess_k + shift[None, None, :])
+
+
+@eqx.filter_jit
+def _finite(flow: Flow) -> Bool[Array, ""]:
+    return jnp.all(jnp.array([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(flow)]))
+
+
+@eqx.filter_jit
+def _relative_change(flow: Flow, before: Flow) -> Float[Array, ""]:
+    """Relative rms difference of the velocities."""
+    moved = sum(jnp.sum((a - b) ** 2) for a, b in zip(flow.velocity, before.velocity, strict=True))
+    total = sum(jnp.sum(a**2) for a in flow.velocity)
+    return jnp.sqrt(moved / (total + 1e-20))
+
+
+def _mean(flows: list[Flow], weights: list[float] | None = None) -> Flow:
+    share = jnp.asarray(weights or [1.0] * len(flows), jnp.float32)
+    share = share / share.sum()
+    return jax.tree.map(lambda *leaves: sum(w * leaf for w, leaf in zip(share, leaves, strict=True)), *flows)

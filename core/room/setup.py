@@ -1,0 +1,169 @@
+"""From a scene to the room solver: patches on cell faces, and the numbers that nobody knows exactly.
+
+A `RoomLayout` holds where things are; `RoomParameters` holds what may be wrong, as deviations that a fit
+can move; `boundary` joins the two, differentiably. Refused here: flow in that cannot leave, patches off
+their wall or over one another, contradictory walls, supply that points out of the room. Repaired with a
+sentence: a patch smaller than a cell, an outlet's missing area.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from core.room.boundary import Boundary, WallPlane, closed_wall
+from core.room.grid import AXES, WALLS, RoomGrid
+from core.room.openings import (
+    Opening,
+    lay_patch,
+    refuse_outward,
+    refuse_overlaps,
+    stated_walls,
+    supply_turbulence,
+)
+from core.scene import Heater, Inlet, Outlet, Scene
+from core.setting import SettingError
+
+
+class RoomParameters(eqx.Module):
+    """What may be wrong, one array a kind. Temperatures in excess of ambient; logarithms are natural.
+
+    `inlet_log_flow` multiplies the stated velocity; `wall_log_heat` and `heater_log_heat` are of the heat
+    coefficient in m/s; `log_closure` multiplies the eddy viscosity, `log_viscosity` on a coarse lattice.
+    """
+
+    inlet_excess_k: Float[Array, " inlets"]
+    inlet_log_flow: Float[Array, " inlets"]
+    wall_excess_k: Float[Array, "6"]
+    wall_log_heat: Float[Array, "6"]
+    heater_excess_k: Float[Array, " heaters"]
+    heater_log_heat: Float[Array, " heaters"]
+    log_closure: Float[Array, ""]
+    log_viscosity: Float[Array, "3 3 4"]
+
+
+class RoomLayout(eqx.Module):
+    """Where openings and heaters are; what is stated about them; sentences about what was repaired."""
+
+    grid: RoomGrid
+    inlets: tuple[Opening, ...]
+    inlet_velocity_m_s: Float[np.ndarray, "inlets 3"]
+    inlet_k_epsilon: Float[np.ndarray, "inlets 2"]
+    outlets: tuple[Opening, ...]
+    heaters: tuple[Opening, ...]
+    heated: Float[np.ndarray, "6"]
+    grip: Float[np.ndarray, "6"]
+    notes: tuple[str, ...] = eqx.field(static=True)
+
+    def inflow_m3_s(self, parameters: RoomParameters) -> Float[Array, " inlets"]:
+        """Volume flow of every inlet."""
+        normal = np.array(
+            [o.inward * v[o.axis] for o, v in zip(self.inlets, self.inlet_velocity_m_s, strict=True)]
+        )
+        area = np.array([o.area_m2 for o in self.inlets])
+        return jnp.asarray(normal * area, jnp.float32) * jnp.exp(parameters.inlet_log_flow)
+
+
+def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
+    """Lay the scene's boundary on `grid`.
+
+    Raises:
+        SettingError: flow that cannot leave, patches off a wall or overlapping, contradictory walls.
+    """
+    inlets = [b for b in scene.boundary if isinstance(b, Inlet)]
+    outlets = [b for b in scene.boundary if isinstance(b, Outlet)]
+    heaters = [b for b in scene.boundary if isinstance(b, Heater)]
+    walls = stated_walls(scene)
+    if inlets and not outlets:
+        flow = ", ".join(f"{i.velocity_m_s}" for i in inlets)
+        raise SettingError(
+            f"Air flows in at {flow} m/s but no outlet is named, so it cannot leave. "
+            "Add [[scene.boundary]] with kind = 'outlet' and its patch."
+        )
+    refuse_overlaps([b.patch for b in (*inlets, *outlets, *heaters)])
+    notes: list[str] = []
+    place = [
+        [lay_patch(b.patch, scene.room, grid, notes) for b in kind] for kind in (inlets, outlets, heaters)
+    ]
+    for inlet, opening in zip(inlets, place[0], strict=True):
+        refuse_outward(inlet, opening)
+    stated = [walls[name] for name in WALLS]
+    heated = np.array([float(wall is None or wall.thermal != "adiabatic") for wall in stated])
+    grip = np.array([float(wall is None or wall.no_slip) for wall in stated])
+    return RoomLayout(
+        grid,
+        tuple(place[0]),
+        np.array([i.velocity_m_s for i in inlets], float).reshape(-1, 3),
+        np.array([supply_turbulence(i) for i in inlets], float).reshape(-1, 2),
+        tuple(place[1]),
+        tuple(place[2]),
+        heated,
+        grip,
+        tuple(notes),
+    )
+
+
+def boundary(layout: RoomLayout, parameters: RoomParameters) -> Boundary:
+    """The walls' arrays for these parameters; differentiable in them."""
+    planes = [_bare(layout, wall, parameters) for wall in range(6)]
+    inflow = layout.inflow_m3_s(parameters)
+    for n, opening in enumerate(layout.inlets):
+        planes[opening.wall] = _with_inlet(planes[opening.wall], layout, n, parameters)
+    area = sum(o.area_m2 for o in layout.outlets)
+    for opening in layout.outlets:
+        speed = inflow.sum() / area
+        fraction = jnp.asarray(opening.fraction, jnp.float32)
+        wall = planes[opening.wall]
+        planes[opening.wall] = eqx.tree_at(
+            lambda w: w.normal_m_s, wall, wall.normal_m_s - opening.inward * speed * fraction
+        )
+    x, y, z = ((planes[2 * a], planes[2 * a + 1]) for a in AXES)
+    return Boundary((x, y, z))
+
+
+def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlane:
+    """The wall with its heaters, without openings' flow: conductances add, weighted by area."""
+    grid = layout.grid
+    plane = closed_wall(grid, wall // 2, float(layout.grip[wall]))
+    closed = jnp.ones_like(plane.normal_m_s)
+    for opening in (*layout.inlets, *layout.outlets, *layout.heaters):
+        if opening.wall == wall:
+            closed = closed - jnp.asarray(opening.fraction, jnp.float32)
+    conductance = float(layout.heated[wall]) * closed * jnp.exp(parameters.wall_log_heat[wall])
+    heat = conductance * parameters.wall_excess_k[wall]
+    for n, opening in enumerate(layout.heaters):
+        if opening.wall == wall:
+            own = jnp.asarray(opening.fraction, jnp.float32) * jnp.exp(parameters.heater_log_heat[n])
+            conductance, heat = conductance + own, heat + own * parameters.heater_excess_k[n]
+    return eqx.tree_at(
+        lambda w: (w.conductance_m_s, w.wall_excess_k), plane, (conductance, heat / (conductance + 1e-12))
+    )
+
+
+def _with_inlet(plane: WallPlane, layout: RoomLayout, n: int, parameters: RoomParameters) -> WallPlane:
+    """Supply `n` on its wall: flow, temperature, turbulence, and the momentum that coarse faces lose."""
+    opening = layout.inlets[n]
+    fraction = jnp.asarray(opening.fraction, jnp.float32)
+    velocity = jnp.asarray(layout.inlet_velocity_m_s[n], jnp.float32) * jnp.exp(parameters.inlet_log_flow[n])
+    inside = fraction > 0
+    first, second = (a for a in AXES if a != opening.axis)
+    normal = velocity[opening.axis]
+    lost = normal**2 * (fraction - fraction**2) / layout.grid.spacing_m[opening.axis]
+    # Speed scales k by its square and epsilon by its cube.
+    gain = jnp.exp(parameters.inlet_log_flow[n])
+    k, epsilon = (float(value) for value in layout.inlet_k_epsilon[n])
+
+    def put(old: Float[Array, "..."], new: Float[Array, ""]) -> Float[Array, "..."]:
+        return jnp.where(inside, new, old)
+
+    return WallPlane(
+        plane.normal_m_s + normal * fraction,
+        (put(plane.tangent_m_s[0], velocity[first]), put(plane.tangent_m_s[1], velocity[second])),
+        put(plane.inflow_excess_k, parameters.inlet_excess_k[n]),
+        plane.force_m_s2 + opening.inward * lost,
+        plane.conductance_m_s,
+        plane.wall_excess_k,
+        put(plane.turbulent_energy_m2_s2, k * gain**2),
+        put(plane.dissipation_m2_s3, epsilon * gain**3),
+        plane.grip,
+    )

@@ -1,0 +1,145 @@
+"""Cells to the room's vertices: linear between cell centres, with the walls' own values on the walls."""
+
+from collections.abc import Callable
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from core.room.boundary import Boundary, WallPlane
+from core.room.grid import AXES, Cells, RoomGrid, Velocity, cut, first_plane, last_plane
+from core.room.model import Flow, RoomModel
+
+Vertices = Float[Array, "vx vy vz"]
+Field = Float[Array, "..."]
+
+
+def vertex_axes_m(grid: RoomGrid, vertices: tuple[int, int, int]) -> tuple[Float[np.ndarray, " n"], ...]:
+    """Vertex coordinates, end planes included."""
+    return tuple(
+        np.linspace(grid.lower_m[a], grid.lower_m[a] + grid.cells[a] * grid.spacing_m[a], vertices[a])
+        for a in AXES
+    )
+
+
+def vertex_excess_k(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> Vertices:
+    """Excess temperature: inlets carry the supply's, heat-passing walls their own, others their air's."""
+
+    def value(wall: WallPlane, cell: Field, inward: float) -> Field:
+        held = jnp.where(wall.conductance_m_s > 0, wall.wall_excess_k, cell)
+        return jnp.where(inward * wall.normal_m_s > 0, wall.inflow_excess_k, held)
+
+    planes = _on_walls(flow.excess_k, model.boundary, value)
+    return _to_vertices(_extended(flow.excess_k, planes), model.grid, vertices)
+
+
+def vertex_pressure_m2_s2(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> Vertices:
+    """Kinematic pressure minus its mean over the outlets (over the room where there is none)."""
+    cells = flow.pressure_m2_s2
+    planes = [(first_plane(cells, a), last_plane(cells, a)) for a in AXES]
+    # The hydrostatic part is linear in z up to the wall.
+    planes[2] = (1.5 * cells[:, :, 0] - 0.5 * cells[:, :, 1], 1.5 * cells[:, :, -1] - 0.5 * cells[:, :, -2])
+    total, area = jnp.float32(0.0), jnp.float32(0.0)
+    for a in AXES:
+        for inward, wall, plane in zip((1.0, -1.0), model.boundary.walls[a], planes[a], strict=True):
+            out = jnp.maximum(-inward * wall.normal_m_s, 0.0)
+            total, area = total + jnp.sum(out * plane), area + jnp.sum(out)
+    gauge = jnp.where(area > 0, total / jnp.maximum(area, 1e-20), cells.mean())
+    return _to_vertices(
+        _extended(cells - gauge, [(p - gauge, q - gauge) for p, q in planes]), model.grid, vertices
+    )
+
+
+def vertex_velocity_m_s(
+    velocity: Velocity, model: RoomModel, vertices: tuple[int, int, int]
+) -> Float[Array, "vx vy vz 3"]:
+    """Velocity; zero on no-slip walls but for the openings."""
+    components = []
+    for a in AXES:
+        component = velocity[a]
+        for b in AXES:
+            if b != a:
+                component = _close(component, model.boundary.walls[b], a, b)
+        components.append(_to_vertices(component, model.grid, vertices, faces=a))
+    return jnp.stack(components, -1)
+
+
+def cell_matrix(
+    grid: RoomGrid, axis: int, vertices: int, *, faces: bool = False
+) -> Float[np.ndarray, "vertices nodes"]:
+    """Linear interpolation from [wall, centres, wall] (or the faces) to equidistant vertices."""
+    centres = np.concatenate([grid.faces_m(axis)[:1], grid.centres_m(axis), grid.faces_m(axis)[-1:]])
+    nodes = grid.faces_m(axis) if faces else centres
+    return linear_matrix(nodes, np.linspace(nodes[0], nodes[-1], vertices))
+
+
+def linear_matrix(
+    nodes: Float[np.ndarray, " nodes"], points: Float[np.ndarray, " points"]
+) -> Float[np.ndarray, "points nodes"]:
+    """Weights of the nodes in the linear interpolant at the points; ends are continued."""
+    index = np.clip(np.searchsorted(nodes, points) - 1, 0, len(nodes) - 2)
+    share = np.clip((points - nodes[index]) / (nodes[index + 1] - nodes[index]), 0.0, 1.0)
+    matrix = np.zeros((len(points), len(nodes)))
+    rows = np.arange(len(points))
+    matrix[rows, index] = 1.0 - share
+    matrix[rows, index + 1] += share
+    return matrix
+
+
+def _on_walls(
+    cells: Cells, boundary: Boundary, value: Callable[[WallPlane, Field, float], Field]
+) -> list[tuple[Field, Field]]:
+    return [
+        (
+            value(boundary.walls[a][0], first_plane(cells, a), 1.0),
+            value(boundary.walls[a][1], last_plane(cells, a), -1.0),
+        )
+        for a in AXES
+    ]
+
+
+def _extended(cells: Cells, planes: list[tuple[Field, Field]]) -> Field:
+    """Cells with their wall values around them; edges are the mean of the two walls that meet."""
+    field = jnp.pad(cells, 1, mode="edge")
+    for a in AXES:
+        for end, plane in zip((0, -1), planes[a], strict=True):
+            field = field.at[tuple(end if b == a else slice(1, -1) for b in AXES)].set(plane)
+    for a in AXES:
+        b, c = (other for other in AXES if other != a)
+        for i, i1 in ((0, 1), (-1, -2)):
+            for j, j1 in ((0, 1), (-1, -2)):
+                one, two = _line(a, b, c, i1, j), _line(a, b, c, i, j1)
+                field = field.at[_line(a, b, c, i, j)].set(0.5 * (field[one] + field[two]))
+    return field
+
+
+def _line(a: int, b: int, c: int, i: int, j: int) -> tuple[slice | int, ...]:
+    index: list[slice | int] = [slice(None)] * 3
+    index[b], index[c] = i, j
+    return tuple(index)
+
+
+def _close(component: Field, walls: tuple[WallPlane, WallPlane], a: int, b: int) -> Field:
+    """Component a with its values on the two walls of axis b."""
+    first, _ = (c for c in AXES if c != b)
+    planes = []
+    for wall, nearest in zip(walls, (first_plane, last_plane), strict=True):
+        axis = 0 if a == first else 1
+        tangent = wall.tangent_m_s[axis]
+        # Onto a's faces: the end faces repeat their cell.
+        padded = jnp.pad(tangent, [(1, 1) if d == axis else (0, 0) for d in (0, 1)], mode="edge")
+        on_faces = 0.5 * (cut(padded, 0, -1, axis) + cut(padded, 1, 0, axis))
+        cell = nearest(component, b)
+        # An axis closed before is longer by its two walls.
+        grown = [((n - m) // 2,) * 2 for n, m in zip(cell.shape, on_faces.shape, strict=True)]
+        planes.append(wall.grip * jnp.pad(on_faces, grown, mode="edge") + (1.0 - wall.grip) * cell)
+    return jnp.concatenate([jnp.expand_dims(planes[0], b), component, jnp.expand_dims(planes[1], b)], b)
+
+
+def _to_vertices(
+    field: Field, grid: RoomGrid, vertices: tuple[int, int, int], *, faces: int | None = None
+) -> Vertices:
+    for a in AXES:
+        matrix = jnp.asarray(cell_matrix(grid, a, vertices[a], faces=faces == a), jnp.float32)
+        field = jnp.moveaxis(jnp.tensordot(matrix, field, axes=(1, a)), 0, a)
+    return field

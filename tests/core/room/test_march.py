@@ -1,0 +1,102 @@
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from core.result import Outcome
+from core.room.boundary import Boundary, WallPlane, closed_room
+from core.room.closure import ConstantClosure
+from core.room.grid import RoomGrid
+from core.room.march import MarchSettings, march
+from core.room.model import RoomModel, air_at_rest, room_model
+from core.setting import SettingError
+
+
+def slippery(wall: WallPlane) -> WallPlane:
+    return eqx.tree_at(lambda w: w.grip, wall, jnp.float32(0.0))
+
+
+def flat_room(cells: int, viscosity: float, walls_x: tuple, walls_z: tuple, buoyancy: float) -> RoomModel:
+    """A unit square in x and z, two cells deep between free walls."""
+    edge = 1.0 / cells
+    grid = RoomGrid(cells=(cells, 2, cells), lower_m=(0.0, 0.0, 0.0), spacing_m=(edge, edge, edge))
+    bare = closed_room(grid)
+    x, y, z = bare.walls
+    boundary = Boundary(
+        (
+            (walls_x[0](x[0]), walls_x[1](x[1])),
+            (slippery(y[0]), slippery(y[1])),
+            (walls_z[0](z[0]), walls_z[1](z[1])),
+        )
+    )
+    closure = ConstantClosure(jnp.float32(0.0), jnp.float32(viscosity))
+    return room_model(grid, boundary, closure, buoyancy_m_s2_k=buoyancy, molecular_m2_s=viscosity)
+
+
+def as_it_is(wall: WallPlane) -> WallPlane:
+    return wall
+
+
+def cavity_nusselt(rayleigh: float, cells: int) -> float:
+    """Mean Nusselt number of de Vahl Davis' cavity, in free-fall units (L = dT = g beta = 1)."""
+    diffusivity = 1.0 / np.sqrt(rayleigh * 0.71)
+
+    def at(excess_k: float):
+        return lambda wall: eqx.tree_at(
+            lambda w: (w.conductance_m_s, w.wall_excess_k),
+            wall,
+            tuple(jnp.full(wall.normal_m_s.shape, v) for v in (2.0 * cells * diffusivity, excess_k)),
+        )
+
+    model = flat_room(cells, 0.71 * diffusivity, (at(0.5), at(-0.5)), (as_it_is, as_it_is), 1.0)
+    x_m = model.grid.centres_m(0)
+    excess_k = jnp.asarray(np.broadcast_to((0.5 - x_m)[:, None, None], model.grid.cells), jnp.float32)
+    end = march(
+        air_at_rest(model, excess_k, 0.1),
+        model,
+        MarchSettings(longest_s=40.0, window_s=4.0, tolerance=1e-3, level_ahead_s=0.0),
+    )
+    assert end.outcome is Outcome.converged
+    return float(jnp.mean(0.5 - end.last.excess_k[0])) * 2 * cells
+
+
+def test_heated_cavity_carries_de_vahl_davis_heat():
+    coarse, fine = cavity_nusselt(1e4, 12), cavity_nusselt(1e4, 24)
+
+    # Second order: the limit of zero spacing from two grids. De Vahl Davis (1983): 2.243.
+    assert fine + (fine - coarse) / 3.0 == pytest.approx(2.243, rel=0.01)
+
+
+def test_lid_driven_cavity_has_the_published_centre_line():
+    def moving(wall: WallPlane) -> WallPlane:
+        return eqx.tree_at(lambda w: w.tangent_m_s[0], wall, jnp.ones_like(wall.normal_m_s))
+
+    model = flat_room(32, 0.01, (as_it_is, as_it_is), (as_it_is, moving), 0.0)
+    end = march(
+        air_at_rest(model, jnp.zeros(model.grid.cells), 0.1),
+        model,
+        MarchSettings(longest_s=20.0, window_s=4.0, tolerance=2e-3, level_ahead_s=0.0),
+    )
+
+    # Ghia, Ghia and Shin (1982), Re 100: u on the vertical centre line, in lid speeds.
+    heights = [0.1016, 0.2813, 0.4531, 0.6172, 0.7344, 0.9531]
+    published = [-0.06434, -0.15662, -0.21090, -0.13641, 0.00332, 0.68717]
+    centre = np.asarray(end.last.velocity[0])[16, 0]
+    found = np.interp(heights, model.grid.centres_m(2), centre)
+    assert found == pytest.approx(np.array(published), abs=0.02)
+
+
+def test_a_march_that_diverges_ends_with_the_last_good_state():
+    model = flat_room(8, 0.01, (as_it_is, as_it_is), (as_it_is, as_it_is), 1.0)
+    start = air_at_rest(model, jnp.zeros(model.grid.cells), 0.1)
+    broken = eqx.tree_at(lambda m: m.buoyancy_m_s2_k, model, jnp.float32(jnp.nan))
+
+    end = march(start, broken, MarchSettings(longest_s=10.0))
+
+    assert end.outcome is Outcome.nonfinite
+    assert bool(jnp.all(jnp.isfinite(end.last.velocity[2])))
+
+
+def test_an_unstable_courant_number_is_refused():
+    with pytest.raises(SettingError, match="stable from 0 to"):
+        MarchSettings(courant=0.9)

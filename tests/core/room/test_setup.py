@@ -1,0 +1,126 @@
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from core.geometry import Box, looking_along_y
+from core.room.closure import KEpsilonClosure
+from core.room.grid import room_grid
+from core.room.level import layer_exchange_m3_s
+from core.room.march import advance_chunk
+from core.room.model import air_at_rest, room_model
+from core.room.pressure import divergence_per_s
+from core.room.setup import RoomParameters, boundary, room_layout
+from core.room.vertices import vertex_excess_k, vertex_velocity_m_s
+from core.scene import FixedTexture, Heater, Inlet, Outlet, Patch, Scene, View, Wall
+from core.setting import SettingError
+
+ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(4.0, 3.0, 2.5))
+SUPPLY = Inlet(
+    patch=Patch(wall="x_min", lower_m=(1.13, 1.5), upper_m=(1.87, 1.77)),
+    temperature_k=303.15,
+    velocity_m_s=(0.5, 0.0, 0.1),
+)
+EXHAUST = Outlet(patch=Patch(wall="z_min", lower_m=(3.0, 1.0), upper_m=(3.5, 2.0)))
+FLOOR = Heater(patch=Patch(wall="z_min", lower_m=(1.0, 1.0), upper_m=(2.0, 2.0)), temperature_k=313.15)
+
+
+def scene(*parts) -> Scene:
+    camera = looking_along_y(position_m=(2.0, -5.0, 1.2), width_px=40, height_px=30, focal_px=60.0)
+    return Scene(room=ROOM, views=(View(camera=camera),), light=FixedTexture(), boundary=parts)
+
+
+def parameters(inlets: int, heaters: int) -> RoomParameters:
+    return RoomParameters(
+        jnp.full(inlets, 10.0),
+        jnp.zeros(inlets),
+        jnp.zeros(6),
+        jnp.full(6, np.log(1e-3)),
+        jnp.full(heaters, 20.0),
+        jnp.full(heaters, np.log(3e-3)),
+        jnp.float32(0.0),
+        jnp.zeros((3, 3, 4)),
+    )
+
+
+def test_openings_keep_their_flow_and_momentum_on_any_grid():
+    for cells in (7, 12):
+        grid = room_grid(ROOM, cells)
+        layout = room_layout(scene(SUPPLY, EXHAUST), grid)
+        low = boundary(layout, parameters(1, 0)).walls[0][0]
+
+        area = grid.face_area_m2(0)
+        patch_m2 = 0.74 * 0.27
+        assert float(low.normal_m_s.sum()) * area == pytest.approx(0.5 * patch_m2, rel=1e-5)
+        # Through the faces, and as a force on the first cells: together U^2 A.
+        momentum = float((low.normal_m_s**2).sum()) * area + float(low.force_m_s2.sum()) * grid.volume_m3
+        assert momentum == pytest.approx(0.25 * patch_m2, rel=1e-5)
+
+
+def test_a_room_with_jet_outlet_and_heater_marches_without_divergence():
+    grid = room_grid(ROOM, 10)
+    layout = room_layout(scene(SUPPLY, EXHAUST, FLOOR, Wall(wall="y_min", thermal="adiabatic")), grid)
+    model = room_model(
+        grid,
+        boundary(layout, parameters(1, 1)),
+        KEpsilonClosure(jnp.float32(1.0), jnp.float32(1.5e-5)),
+        buoyancy_m_s2_k=9.81 / 293.15,
+        molecular_m2_s=1.5e-5,
+    )
+    flow, mean = advance_chunk(air_at_rest(model, jnp.zeros(grid.cells), 0.5), model, jnp.float32(0.05), 20)
+
+    assert float(jnp.abs(divergence_per_s(flow.velocity, grid)).max()) < 1e-4
+    assert float(flow.turbulence.energy_m2_s2.min()) > 0
+    vertices = (9, 8, 7)
+    excess = np.asarray(vertex_excess_k(flow, model, vertices))
+    # Bounded by ambient, supply and heater.
+    assert excess.min() > -1e-3
+    assert excess.max() < 20.001
+    velocity = np.asarray(vertex_velocity_m_s(mean.velocity, model, vertices))
+    assert velocity.shape == (9, 8, 7, 3)
+    assert np.all(velocity[:, 0] == 0)
+    # Two seconds of supply push air along x.
+    assert velocity[..., 0].max() > 0.1
+
+
+def test_layers_exchange_all_heat_that_is_not_lost():
+    grid = room_grid(ROOM, 8)
+    layout = room_layout(scene(SUPPLY, EXHAUST), grid)
+    walls = boundary(layout, parameters(1, 0))
+    model = room_model(
+        grid,
+        walls,
+        KEpsilonClosure(jnp.float32(1.0), jnp.float32(1.5e-5)),
+        buoyancy_m_s2_k=0.03,
+        molecular_m2_s=1.5e-5,
+    )
+
+    lost = layer_exchange_m3_s(air_at_rest(model, jnp.zeros(grid.cells), 0.5), model).sum()
+
+    walls_m2 = 2 * (4 * 3 + 4 * 2.5 + 3 * 2.5) - 0.74 * 0.27 - 0.5
+    assert float(lost) == pytest.approx(walls_m2 * 1e-3 + 0.5 * 0.74 * 0.27, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("parts", "sentence"),
+    [
+        ((SUPPLY,), "cannot leave"),
+        ((SUPPLY, EXHAUST, EXHAUST), "overlap"),
+        ((Outlet(patch=Patch(wall="y_max", lower_m=(3.0, 1.0), upper_m=(4.5, 2.0))),), "the wall spans"),
+        ((Wall(wall="x_min"), Wall(wall="x_min", thermal="adiabatic")), "stated twice"),
+        (
+            (Inlet(patch=SUPPLY.patch, temperature_k=300.0, velocity_m_s=(-0.5, 0.0, 0.0)), EXHAUST),
+            "does not enter",
+        ),
+    ],
+)
+def test_a_boundary_that_cannot_be_is_refused(parts, sentence: str):
+    with pytest.raises(SettingError, match=sentence):
+        room_layout(scene(*parts), room_grid(ROOM, 8))
+
+
+def test_a_patch_smaller_than_a_cell_is_noted():
+    slit = Outlet(patch=Patch(wall="z_max", lower_m=(1.0, 1.0), upper_m=(1.05, 2.0)))
+
+    layout = room_layout(scene(SUPPLY, slit), room_grid(ROOM, 8))
+
+    assert any("less than the cells'" in note for note in layout.notes)
