@@ -5,8 +5,15 @@ from pathlib import Path
 from app.jobs.config import JobsConfig
 from app.jobs.engine import Engine
 from app.jobs.local import LocalEngine
+from app.jobs.ray import RayEngine
+from app.jobs.slurm import SlurmEngine
 
 
 def create_engine(config: JobsConfig, folder: Path) -> Engine:
-    """Return the configured engine. Raises EngineError when it cannot be used."""
-    return LocalEngine(folder / "cache")
+    """Return the configured engine; `folder` keeps what it caches."""
+    engines = {
+        "local": lambda: LocalEngine(folder / "cache"),
+        "ray": lambda: RayEngine(config.ray),
+        "slurm": lambda: SlurmEngine(config.slurm),
+    }
+    return engines[config.engine]()

@@ -77,6 +77,11 @@ class JobFolder:
         with self.locked():
             write_json(self.path / "owner.json", {"attempt": owner.attempt, "token": owner.token})
 
+    def revoke(self) -> None:
+        """Leave the job without an owner: whatever worker still lives ends itself at its next renewal."""
+        with self.locked():
+            write_json(self.path / "owner.json", {"attempt": 0, "token": ""})
+
     def check(self, owner: Owner) -> None:
         """Raise FencedError unless `owner` still owns the job."""
         if self.owner() != owner:

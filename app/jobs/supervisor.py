@@ -103,7 +103,7 @@ class Supervisor:
         elif self._is_silent(job, folder, state):
             self._abandon(job, folder)
         else:
-            self._enforce_stop(job)
+            self._enforce_stop(job, folder)
 
     def _process_state(self, job: Job, folder: JobFolder) -> ProcessState:
         if is_held(folder.attempt(job.attempt) / "worker.lock"):
@@ -169,13 +169,19 @@ class Supervisor:
 
     def _abandon(self, job: Job, folder: JobFolder) -> None:
         """Give up a silent worker. It may still be alive: the fence keeps it from publishing."""
-        if job.handle:
-            with contextlib.suppress(EngineError):
-                self._engine.stop(job.handle, kill=True)
+        self._kill(job, folder)
         message = f"The worker gave no sign of life for {self._config.lease_s:g} s."
         self._part(job, worker_status.VANISHED, message)
 
-    def _enforce_stop(self, job: Job) -> None:
+    def _kill(self, job: Job, folder: JobFolder) -> None:
+        """End a worker for certain: by the engine, and where that fails by taking its lease."""
+        with contextlib.suppress(TimeoutError):
+            folder.revoke()
+        with contextlib.suppress(EngineError):
+            if job.handle:
+                self._engine.stop(job.handle, kill=True)
+
+    def _enforce_stop(self, job: Job, folder: JobFolder) -> None:
         asked_s = self._dispatch.stop_asked_s(job.id)
         if asked_s is None or job.handle is None:
             return
@@ -183,7 +189,10 @@ class Supervisor:
         if self._told.get(job.id) == (job.attempt, kill):
             return
         try:
-            self._engine.stop(job.handle, kill=kill)
+            if kill:
+                self._kill(job, folder)
+            else:
+                self._engine.stop(job.handle)
             self._told[job.id] = (job.attempt, kill)
         except EngineError as error:
             _log.warning("%s", error)
