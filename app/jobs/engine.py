@@ -71,3 +71,7 @@ class Engine(Protocol):
     def stop(self, handle: str, *, kill: bool = False) -> None:
         """Ask the process to write a checkpoint and end, or end it at once; gone already is no error."""
         ...
+
+    def close(self) -> None:
+        """Give back connections; the processes go on."""
+        ...

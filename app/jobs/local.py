@@ -70,6 +70,9 @@ class LocalEngine:
             elif process is not None:
                 process.terminate()
 
+    def close(self) -> None:
+        """Nothing to give back."""
+
     def memory_bytes(self, handle: str) -> int:
         """Return the resident memory of the worker, 0 when it is gone."""
         process = _process(handle)

@@ -50,7 +50,7 @@ class RayEngine:
     def start(self, launch: Launch) -> str:
         """Submit the worker. A submission that was repeated after a crash finds the first one."""
         body = {
-            "entrypoint": shlex.join([self._config.python, *launch.worker_arguments]),
+            "entrypoint": f"exec {shlex.join([self._config.python, *launch.worker_arguments])}",
             "submission_id": launch.name,
             "entrypoint_num_cpus": self._config.cpus_per_job,
             "entrypoint_num_gpus": self._config.gpus_per_job,
@@ -83,6 +83,10 @@ class RayEngine:
     def stop(self, handle: str, *, kill: bool = False) -> None:
         """Ask Ray to stop the process: SIGTERM, and SIGKILL after `RAY_JOB_STOP_WAIT_TIME_S`."""
         self._send("POST", f"/api/jobs/{handle}/stop")
+
+    def close(self) -> None:
+        """Close the connections to the head."""
+        self._client.close()
 
     def _checked(self, method: str, path: str) -> httpx.Response:
         response = self._send(method, path)

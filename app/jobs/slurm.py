@@ -70,6 +70,9 @@ class SlurmEngine:
         elif self.state(handle) is ProcessState.running:
             self._run("scancel", "--signal=TERM", "--full", handle)
 
+    def close(self) -> None:
+        """Nothing to give back: each command is a process of its own."""
+
     def _run(self, *command: str) -> str:
         try:
             done = subprocess.run(

@@ -55,7 +55,7 @@ class Supervisor:
 
         Raises JobError when another supervisor has this folder, EngineError when the engine is not safe.
         """
-        with self._only_one():
+        with self._only_one(), contextlib.closing(self._engine):
             self._engine.probe()
             while not stop.is_set():
                 try:
