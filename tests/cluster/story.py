@@ -90,7 +90,7 @@ def check_lost_node(folder: Path, config: JobsConfig, kill_node: Callable[[psuti
         old, step = process_of(job_folder.attempt(1)), ledger.get(job.id).step
         start_s = time.monotonic()
         kill_node(old)
-        survived = old.is_running()
+        survived = old.is_running() and old.status() != psutil.STATUS_ZOMBIE
         until(lambda: ledger.get(job.id).attempt > 1 and ledger.get(job.id).step > step, 90)
         again_s = time.monotonic() - start_s
         # Where only the node's daemon died, the fence ends the worker that lived on.
