@@ -1,0 +1,35 @@
+"""The contract of a responder: whole commands in, replies with their delay out."""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from drivers.simulated.projector.state import ProjectorState
+
+
+@dataclass(frozen=True)
+class Reply:
+    """Bytes that leave `delay_s` after the command."""
+
+    data: bytes
+    delay_s: float = 0.0
+
+
+@runtime_checkable
+class Responder(Protocol):
+    """A dialect from the projector's side. `error` is its way to refuse, `news` what it says unasked."""
+
+    state: ProjectorState
+    error: bytes
+    news: bytes
+
+    def greeting(self) -> bytes:
+        """Return what is said when a line opens."""
+        ...
+
+    def split(self, buffer: bytes) -> tuple[list[bytes], bytes]:
+        """Return whole commands and the rest."""
+        ...
+
+    def respond(self, command: bytes) -> list[Reply]:
+        """Return the replies to one command; none means silence."""
+        ...
