@@ -23,7 +23,7 @@ from pydantic import TypeAdapter
 
 from app.capture_files import BurstImage, RawStack, read_image, write_image
 from app.configuration import to_plain
-from app.durable import write_json
+from app.durable import make_folder, sync, write_json
 from app.errors import BadInputError
 from app.experiment import read_manifest, write_manifest
 from app.provenance import sha256
@@ -113,7 +113,9 @@ class CaptureRecorder:
     """
 
     def __init__(self, folder: Path, plan: CapturePlan, checkpoint_s: float = CHECKPOINT_S) -> None:
-        folder.mkdir(parents=True)
+        make_folder(folder.parent)
+        folder.mkdir()
+        sync(folder.parent)
         started = datetime.now(UTC).isoformat(timespec="seconds")
         about = {"role": plan.kind, "plan": to_plain(plan), "started": started, "process": os.getpid()}
         write_json(folder / "incomplete.json", about)
