@@ -184,7 +184,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=300)
     parser.add_argument("--jobs", type=int, default=20)
-    parser.add_argument("--trials", type=int, default=2000)
+    parser.add_argument("--trials", type=int, default=3000)
     parser.add_argument("--pause-s", type=float, default=2.0, help="mean pause between kills")
     parser.add_argument("--limit-s", type=float, default=1800.0)
     parser.add_argument("--seed", type=int, default=0)
