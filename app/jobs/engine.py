@@ -68,6 +68,10 @@ class Engine(Protocol):
         """Say whether the process is there."""
         ...
 
+    def exit_status(self, handle: str) -> int | None:
+        """Return how the process ended, None when the engine does not know."""
+        ...
+
     def stop(self, handle: str, *, kill: bool = False) -> None:
         """Ask the process to write a checkpoint and end, or end it at once; gone already is no error."""
         ...

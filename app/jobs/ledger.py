@@ -11,7 +11,7 @@ import sqlite3
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from app.durable import make_folder, write_json
 from app.jobs import kinds
@@ -34,6 +34,16 @@ class Ledger:
     def __init__(self, folder: Path) -> None:
         self.folder = Path(folder).resolve()
         self.store = Store(self.folder / "ledger.sqlite")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close this thread's connection; the next call opens it again."""
+        self.store.close()
 
     def folder_of(self, job: str) -> Path:
         """Return the job's own folder."""

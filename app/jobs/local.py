@@ -22,6 +22,7 @@ class LocalEngine:
     def __init__(self, cache: Path) -> None:
         self._cache = cache
         self._children: set[int] = set()
+        self._ended: dict[int, int] = {}
 
     def probe(self) -> None:
         """Nothing to check: the machine is here."""
@@ -61,6 +62,10 @@ class LocalEngine:
         self._reap()
         return ProcessState.gone if _process(handle) is None else ProcessState.running
 
+    def exit_status(self, handle: str) -> int | None:
+        """Return the exit status of a child; that of an adopted worker is not known."""
+        return self._ended.get(int(handle.partition(":")[0]))
+
     def stop(self, handle: str, *, kill: bool = False) -> None:
         """Signal the worker: SIGTERM to itself, SIGKILL to its whole session."""
         process = _process(handle)
@@ -84,8 +89,10 @@ class LocalEngine:
         """Collect the children that ended; those that this process adopted are init's to collect."""
         for pid in list(self._children):
             with contextlib.suppress(ChildProcessError):
-                if os.waitpid(pid, os.WNOHANG) == (0, 0):
+                found, status = os.waitpid(pid, os.WNOHANG)
+                if found == 0:
                     continue
+                self._ended[pid] = os.waitstatus_to_exitcode(status)
             self._children.discard(pid)
 
 

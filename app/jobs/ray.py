@@ -80,6 +80,11 @@ class RayEngine:
             raise EngineError(f"Ray answered {response.status_code} for {handle}: {response.text[:200]!r}.")
         return _STATES.get(response.json()["status"], ProcessState.unknown)
 
+    def exit_status(self, handle: str) -> int | None:
+        """Return the status that the head noted, if it did."""
+        response = self._send("GET", f"/api/jobs/{handle}")
+        return response.json().get("driver_exit_code") if response.is_success else None
+
     def stop(self, handle: str, *, kill: bool = False) -> None:
         """Ask Ray to stop the process: SIGTERM, and SIGKILL after `RAY_JOB_STOP_WAIT_TIME_S`."""
         self._send("POST", f"/api/jobs/{handle}/stop")

@@ -63,6 +63,10 @@ class SlurmEngine:
             return ProcessState.gone
         return ProcessState.pending if states[handle] in _PENDING else ProcessState.running
 
+    def exit_status(self, handle: str) -> int | None:
+        """Not known without SLURM's accounting; the worker's own word in exit.json is enough."""
+        return None
+
     def stop(self, handle: str, *, kill: bool = False) -> None:
         """Send SIGTERM to a running worker; with `kill`, or while it waits, take the job away."""
         if kill or self.state(handle) is ProcessState.pending:

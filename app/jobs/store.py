@@ -77,6 +77,14 @@ class Store:
         self._path = path
         self._local = threading.local()
         make_folder(path.parent)
+        try:
+            self._create()
+            sync(path.parent)
+        except BaseException:
+            self.close()
+            raise
+
+    def _create(self) -> None:
         with self.transaction() as database:
             found = database.execute("PRAGMA user_version").fetchone()[0]
             if found == 0:
@@ -85,10 +93,9 @@ class Store:
                 database.execute(f"PRAGMA user_version = {SCHEMA}")
             elif found != SCHEMA:
                 raise LedgerError(
-                    f"{path} has schema {found}; this version reads schema {SCHEMA}. "
+                    f"{self._path} has schema {found}; this version reads schema {SCHEMA}. "
                     "Use the version of airlens that wrote it, or start with an empty folder."
                 )
-        sync(path.parent)
 
     @contextlib.contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
@@ -129,11 +136,14 @@ class Store:
         database = getattr(self._local, "database", None)
         if database is None:
             database = sqlite3.connect(self._path, isolation_level=None, timeout=20.0)
-            database.row_factory = sqlite3.Row
-            database.execute("PRAGMA journal_mode = WAL")
-            database.execute("PRAGMA synchronous = FULL")
-            database.execute("PRAGMA foreign_keys = ON")
             self._local.database = database
+            database.row_factory = sqlite3.Row
+            try:
+                for setting in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
+                    database.execute(f"PRAGMA {setting}")
+            except sqlite3.DatabaseError:
+                self.close()
+                raise
         return database
 
 

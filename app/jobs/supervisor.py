@@ -99,7 +99,7 @@ class Supervisor:
         elif goodbye is not None:
             self._part(job, goodbye["status"], goodbye["message"])
         elif state is ProcessState.gone:
-            self._part(job, worker_status.VANISHED, "The worker ended without a word.")
+            self._part(job, *self._last_word(job))
         elif self._is_silent(job, folder, state):
             self._abandon(job, folder)
         else:
@@ -125,6 +125,16 @@ class Supervisor:
         if time.monotonic() - since_s > _FAREWELL_S and job.handle:
             with contextlib.suppress(EngineError):
                 self._engine.stop(job.handle, kill=True)
+
+    def _last_word(self, job: Job) -> tuple[int, str]:
+        """Return status and message of a worker that left no exit.json."""
+        status = None
+        with contextlib.suppress(EngineError):
+            status = self._engine.exit_status(job.handle) if job.handle else None
+        if status == worker_status.NO_SPACE:
+            return status, "The disk was full; nothing half-written was kept. Free space on it."
+        told = "without a word" if status is None else f"without a word, with status {status}"
+        return worker_status.VANISHED, f"The worker ended {told}."
 
     def _part(self, job: Job, status: int, message: str) -> None:
         """Decide what a worker's end means for its job."""

@@ -104,6 +104,68 @@ def live(mount: Path, wanted: Sequence[JobSpec]) -> None:
     ledger.store.close()
 
 
+def live_on_a_full_disk(mount: Path, wanted: Sequence[JobSpec], writes: int) -> dict[str, Any]:
+    """Let the disk be full after so many writes and free it a little later; return what happened.
+
+    A submission that the full disk refuses is repeated with its key, as a client does.
+    """
+    folder, errors, ids = mount / "jobs", set(), []
+    (mount / ".full").write_text(str(writes))
+    freer = threading.Thread(target=_free_later, args=(mount,))
+    freer.start()
+    child = None
+    try:
+        while len(ids) < len(wanted) or not _all_done(folder):
+            try:
+                with Ledger(folder) as ledger:
+                    (folder / "jobs.toml").write_text(CONFIG + "disk_reserve_bytes = 0\n")
+                    ids = [ledger.submit(spec, key=f"job-{n}").id for n, spec in enumerate(wanted)]
+            except (AirlensError, OSError) as error:
+                errors.add(str(error))
+            if child is None or child.poll() is not None:
+                log = open(mount.parent / "supervisor.log", "ab")
+                child = subprocess.Popen([sys.executable, "-m", "app.jobs", str(folder)], stderr=log)
+                log.close()
+            time.sleep(0.2)
+    finally:
+        freer.join()
+        if child is not None:
+            child.terminate()
+            child.wait(60)
+    ledger = Ledger(folder)
+    events = [event.body.get("reason", "") for event in ledger.events()]
+    told = errors | set((mount.parent / "supervisor.log").read_text().splitlines()) | set(events)
+    damage = [tuple(row) for row in ledger.store.rows("PRAGMA integrity_check")] != [("ok",)]
+    results = {_key(job): finish(ledger, job) for job in ledger.jobs()}
+    ledger.store.close()
+    return {"told": [text for text in told if _tells_full(text)], "damage": damage, "results": results}
+
+
+def _free_later(mount: Path) -> None:
+    """Wait until the disk is full (or all is done without it), leave it so for a moment, free it."""
+    deadline_s = time.monotonic() + 60
+    while shutil.disk_usage(mount).free and time.monotonic() < deadline_s:
+        if (mount / "jobs").exists() and _all_done(mount / "jobs"):
+            break
+        time.sleep(0.05)
+    time.sleep(1.0)
+    (mount / ".full").write_text("-1")
+
+
+def _all_done(folder: Path) -> bool:
+    try:
+        with Ledger(folder) as ledger:
+            jobs = ledger.jobs()
+    except (AirlensError, OSError):
+        return False
+    return bool(jobs) and all(job.state is JobState.done for job in jobs)
+
+
+def _tells_full(text: str) -> bool:
+    words = ("disk is full", "disk was full", "No space left", "Waiting for disk space", "disk I/O error")
+    return any(word in text for word in words)
+
+
 def take_burst() -> Burst:
     view = pattern()
     camera = SimulatedCamera(lambda: view, seed=5)
