@@ -10,21 +10,28 @@ from rich.console import Console
 from rich.table import Table
 
 from app.errors import BadInputError
-from app.jobs import Event, Job, JobSpec, JobState, Ledger
+from app.jobs import Event, Group, Job, JobSpec, JobState, Ledger, submit_ensemble, submit_sweep, summarise
 from app.jobs.__main__ import supervise
+from app.jobs.study import plain as plain_summary
 
 Folder = Annotated[
     Path, typer.Option("--folder", envvar="AIRLENS_JOBS", help="The folder of the ledger and its jobs.")
 ]
 JobId = Annotated[str, typer.Argument(help="The job's id.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Kind = Annotated[str, typer.Argument(help="What to compute, such as reconstruct or noise-study.")]
+Settings = Annotated[list[str] | None, typer.Argument(help="Settings as NAME=VALUE (JSON).")]
+ExperimentFolder = Annotated[Path | None, typer.Option("--experiment", help="The experiment's folder.")]
+Title = Annotated[str, typer.Option(help="A name for people.")]
 HERE = Path("jobs")
 
 
 def register(cli: typer.Typer) -> None:
     """Add `jobs` and its subcommands."""
     jobs = typer.Typer(no_args_is_help=True, help="Queue, watch, stop and resume computations.")
-    for command in (run, submit, show, events, cancel, pause, resume, retry, order):
+    for command in (run, submit, sweep, ensemble, groups, summary, show, events):
+        jobs.command()(command)
+    for command in (cancel, pause, resume, retry, order):
         jobs.command()(command)
     jobs.command("list")(list_jobs)
     cli.add_typer(jobs, name="jobs")
@@ -36,10 +43,10 @@ def run(folder: Folder = HERE) -> None:
 
 
 def submit(
-    kind: Annotated[str, typer.Argument(help="What to compute, such as reconstruct or noise-study.")],
-    settings: Annotated[list[str] | None, typer.Argument(help="Settings as NAME=VALUE (JSON).")] = None,
-    experiment: Annotated[Path | None, typer.Option(help="The experiment's folder.")] = None,
-    title: Annotated[str, typer.Option(help="A name for people.")] = "",
+    kind: Kind,
+    settings: Settings = None,
+    experiment: ExperimentFolder = None,
+    title: Title = "",
     priority: Annotated[int, typer.Option(help="Higher starts first.")] = 0,
     folder: Folder = HERE,
     as_json: AsJson = False,
@@ -49,6 +56,64 @@ def submit(
         kind=kind, settings=read_settings(settings), experiment=experiment, title=title, priority=priority
     )
     _print_job(Ledger(folder).submit(spec), as_json)
+
+
+def sweep(
+    kind: Kind,
+    over: Annotated[list[str], typer.Option(help="NAME=[1,2,3]; several give every combination.")],
+    settings: Settings = None,
+    experiment: ExperimentFolder = None,
+    title: Title = "",
+    folder: Folder = HERE,
+    as_json: AsJson = False,
+) -> None:
+    """Queue one job for every combination of values and print the group."""
+    axes = read_settings(over)
+    for name, values in axes.items():
+        if not isinstance(values, list):
+            raise BadInputError(f"--over {name} was given {values!r}; expected a list such as [1,2,3].")
+    spec = JobSpec(kind=kind, settings=read_settings(settings), experiment=experiment)
+    _print_group(*submit_sweep(Ledger(folder), spec, axes, title), as_json)
+
+
+def ensemble(
+    kind: Kind,
+    settings: Settings = None,
+    members: Annotated[int, typer.Option(min=1, help="Jobs that differ only in their seed.")] = 8,
+    experiment: ExperimentFolder = None,
+    title: Title = "",
+    folder: Folder = HERE,
+    as_json: AsJson = False,
+) -> None:
+    """Queue the members of an ensemble and print the group."""
+    spec = JobSpec(kind=kind, settings=read_settings(settings), experiment=experiment)
+    _print_group(*submit_ensemble(Ledger(folder), spec, members, title), as_json)
+
+
+def groups(folder: Folder = HERE, as_json: AsJson = False) -> None:
+    """List sweeps and ensembles, newest first."""
+    found = Ledger(folder).groups()
+    text = json.dumps([vars(g) for g in found]) if as_json else "\n".join(f"{g.id}  {g.title}" for g in found)
+    typer.echo(text)
+
+
+def summary(
+    group: Annotated[str, typer.Argument(help="The group's id.")],
+    folder: Folder = HERE,
+    as_json: AsJson = False,
+) -> None:
+    """Summarise a sweep or an ensemble: every job's numbers, and their spread."""
+    found = summarise(Ledger(folder), group)
+    if as_json:
+        typer.echo(json.dumps(plain_summary(found), indent=1))
+        return
+    table = Table(*(found.points[0].settings if found.points else ()), "state", *found.spread)
+    for point in found.points:
+        numbers = [f"{point.numbers[n]:.6g}" if n in point.numbers else "" for n in found.spread]
+        table.add_row(*map(str, point.settings.values()), point.state, *numbers)
+    Console().print(table)
+    for name, spread in found.spread.items():
+        typer.echo(f"{name}: {spread.mean:.6g} +- {spread.std:.2g} ({spread.least:.6g} to {spread.most:.6g})")
 
 
 def list_jobs(
@@ -149,6 +214,11 @@ def plain(job: Job) -> dict[str, Any]:
 def _print_job(job: Job, as_json: bool) -> None:
     line = f"{job.id}  {job.title}  {job.state}  {job.progress:.0%}  {job.reason}".rstrip()
     typer.echo(json.dumps(plain(job)) if as_json else line)
+
+
+def _print_group(group: Group, jobs: list[Job], as_json: bool) -> None:
+    told = {"group": group.id, "title": group.title, "jobs": [job.id for job in jobs]}
+    typer.echo(json.dumps(told) if as_json else f"{group.id}  {group.title}  {len(jobs)} jobs")
 
 
 def _plain_event(event: Event) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from app.jobs.errors import EngineError, FencedError, JobError, LedgerError, Unk
 from app.jobs.ledger import Ledger
 from app.jobs.records import Event, Group, Job, JobSpec
 from app.jobs.state import JobState
+from app.jobs.study import Summary, submit_ensemble, submit_sweep, summarise
 from app.jobs.supervisor import Supervisor
 
 __all__ = [
@@ -19,7 +20,11 @@ __all__ = [
     "JobsConfig",
     "Ledger",
     "LedgerError",
+    "Summary",
     "Supervisor",
     "UnknownJobError",
     "read_config",
+    "submit_ensemble",
+    "submit_sweep",
+    "summarise",
 ]

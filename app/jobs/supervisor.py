@@ -24,6 +24,7 @@ from app.jobs.ledger import Ledger
 from app.jobs.local import LocalEngine
 from app.jobs.records import Job
 from app.jobs.state import JobState
+from app.jobs.study import MOST_JOBS, keep_summary
 
 _log = logging.getLogger(__name__)
 _FAREWELL_S = 5.0
@@ -70,7 +71,14 @@ class Supervisor:
         """Look at every active job once, then start what fits."""
         for job in self._dispatch.active():
             self._judge(job)
+            if job.group and not self._ledger.get(job.id).state.is_active:
+                self._sum_up(job.group)
         self._fill()
+
+    def _sum_up(self, group: str) -> None:
+        """Keep the summary of a group whose last job has ended."""
+        if all(job.state.is_finished for job in self._ledger.jobs(group=group, limit=MOST_JOBS)):
+            keep_summary(self._ledger, group)
 
     @contextlib.contextmanager
     def _only_one(self) -> Iterator[None]:
