@@ -1,19 +1,20 @@
-"""A projector over a line: one request at a time, answers told from echoes and news, warm-up as a state."""
+"""A projector over a line: one request at a time, warm-up as a state, the lamp guarded, sets verified."""
 
 import threading
+from collections import Counter
 from typing import TypeVar
 
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceNotFoundError, DeviceRefusedError, DeviceTimeoutError
-from drivers.projector.dialect import Answer, AnswerKind, Dialect, Request, Verb
+from drivers.projector.dialect import AnswerKind, Dialect, Request, Verb
+from drivers.projector.exchange import QUIET_S, Exchange
 from drivers.projector.lamp_guard import LampGuard
 from drivers.projector.port import Port
 from drivers.projector.protocol import Capability, PowerState, ProjectorStatus
 from drivers.projector.wire_log import WireLog
 
 T = TypeVar("T")
-SLICE_S = 0.1
-QUIET_S = 0.3
+ABSENT_AFTER = 2
 _ASKED = {
     Capability.SOURCE: Verb.ASK_SOURCE,
     Capability.MUTE: Verb.ASK_MUTE,
@@ -22,7 +23,12 @@ _ASKED = {
     Capability.ERRORS: Verb.ASK_ERRORS,
     Capability.NAME: Verb.ASK_NAME,
 }
-_ALWAYS = (Capability.LAMP_HOURS, Capability.ERRORS, Capability.NAME)
+_IN_STANDBY = (Capability.LAMP_HOURS, Capability.ERRORS, Capability.NAME)
+_REASONS = {
+    AnswerKind.ABSENT: "does not know this command or value; ask its status for what it knows",
+    AnswerKind.BUSY: "is busy switching; wait a minute, then repeat",
+    AnswerKind.FAILED: "refused; look at its indicators and at the wire log",
+}
 
 
 class ProjectorLink:
@@ -31,74 +37,58 @@ class ProjectorLink:
     def __init__(
         self, dialect: Dialect, port: Port, *, guard: LampGuard | None = None, clock: Clock | None = None
     ) -> None:
-        self.log = WireLog()
-        self._dialect, self._port = dialect, port
-        self._guard, self._clock = guard or LampGuard(), clock or SystemClock()
+        self._clock = clock or SystemClock()
+        self._dialect, self._guard = dialect, guard or LampGuard()
+        self._line = Exchange(dialect, port, self._clock)
         self._lock = threading.RLock()
-        self._buffer, self._opened, self._suspect = b"", False, False
-        self._absent: set[Verb] = set()
+        self._unknown: Counter[Verb] = Counter()
         self._switching: tuple[PowerState, float] | None = None
-        self._lighting: Request | None = None
+        self._lighting = False
+
+    @property
+    def log(self) -> WireLog:
+        """Every byte that went over the line."""
+        return self._line.log
 
     @property
     def capabilities(self) -> frozenset[Capability]:
         """What the dialect can say, less what this model turned out not to know."""
-        absent = {cap for cap, verb in _ASKED.items() if verb in self._absent}
+        absent = {cap for cap, verb in _ASKED.items() if self._unknown[verb] >= ABSENT_AFTER}
         return self._dialect.capabilities - absent
 
     def power(self) -> PowerState:
         """Return the power state; within the manual's times, silence after a switch is a state too."""
         with self._lock:
-            if self._lighting is not None and not self._lit():
-                return PowerState.WARMING
-            try:
-                answer = self._ask(Request(Verb.ASK_POWER))
-            except DeviceTimeoutError:
-                return self._expected_state() or PowerState.SILENT
-            if answer.kind is AnswerKind.BUSY:
-                return self._expected_state() or PowerState.WARMING
-            if isinstance(answer.value, PowerState):
-                return self._note(answer.value)
-            return PowerState.FAULT
+            self._line.begin()
+            return self._power()
 
     def status(self) -> ProjectorStatus:
         """Return everything that it says of itself; asks no further once it stops answering."""
         with self._lock:
-            power = self.power()
-            found: dict[Capability, object] = {}
-            answering = power in (PowerState.ON, PowerState.STANDBY)
-            for capability, verb in _ASKED.items():
-                if not answering or (power is not PowerState.ON and capability not in _ALWAYS):
-                    continue
-                try:
-                    answer = self._ask(Request(verb))
-                except DeviceTimeoutError:
-                    answering = False
-                    continue
-                if answer.kind is AnswerKind.VALUE:
-                    found[capability] = answer.value
-                elif answer.kind is AnswerKind.ABSENT and power is PowerState.ON:
-                    self._absent.add(verb)
-            return _status(power, found, self._guard.on_s)
+            self._line.begin()
+            power = self._power()
+            on_s = self._guard.on_s if power is PowerState.ON else None
+            if power not in (PowerState.ON, PowerState.STANDBY):
+                return ProjectorStatus(power)
+            return _status(power, self._ask_all(_ASKED if power is PowerState.ON else _IN_STANDBY), on_s)
 
     def turn_on(self) -> None:
         """Begin to light the lamp."""
         with self._lock:
-            if self.power() in (PowerState.ON, PowerState.WARMING):
+            self._line.begin()
+            if self._power() in (PowerState.ON, PowerState.WARMING):
                 return
             self._guard.may_light()
-            request = Request(Verb.POWER_ON)
-            if self._dialect.silent_start:
-                self._light(request)
-            else:
-                self._command(request)
+            # Noted before it is sent: a lost answer does not mean that the lamp stays dark.
+            self._switch(PowerState.WARMING, self._dialect.ignition_s)
             self._guard.lit()
-            self._switching = PowerState.WARMING, self._clock.now_s() + self._dialect.ignition_s
+            self._light() if self._dialect.silent_start else self._command(Request(Verb.POWER_ON))
 
     def turn_off(self) -> None:
         """Begin to cool down."""
         with self._lock:
-            state = self.power()
+            self._line.begin()
+            state = self._power()
             if state in (PowerState.STANDBY, PowerState.COOLING):
                 return
             if state is PowerState.WARMING:
@@ -107,34 +97,30 @@ class ProjectorLink:
                     "put out while it ignites is damaged."
                 )
             self._guard.may_put_out()
+            self._switch(PowerState.COOLING, self._dialect.cooling_s)
             self._command(Request(Verb.POWER_OFF))
             self._guard.put_out()
-            self._switching = PowerState.COOLING, self._clock.now_s() + self._dialect.cooling_s
 
     def select_source(self, code: str) -> None:
         """Show another input."""
         if not code.isalnum() or len(code) > 16 or not code.isascii():
             raise DeviceRefusedError(f"{code!r} is no input's code. Use letters and digits as in the manual.")
         with self._lock:
+            self._line.begin()
             self._command(Request(Verb.SELECT_SOURCE, code))
 
     def mute(self, on: bool) -> None:
         """Make the picture black, or show it; verified by asking where that is possible."""
-        with self._lock:
-            self._command(Request(Verb.MUTE if on else Verb.UNMUTE))
-            self._verify(Verb.ASK_MUTE, on)
+        self._set(Verb.MUTE if on else Verb.UNMUTE, Verb.ASK_MUTE, on)
 
     def freeze(self, on: bool) -> None:
         """Hold the picture, or let it go; verified by asking where that is possible."""
-        with self._lock:
-            self._command(Request(Verb.FREEZE if on else Verb.UNFREEZE))
-            self._verify(Verb.ASK_FREEZE, on)
+        self._set(Verb.FREEZE if on else Verb.UNFREEZE, Verb.ASK_FREEZE, on)
 
     def close(self) -> None:
         """Free the line."""
         with self._lock:
-            self._port.close()
-            self._opened = False
+            self._line.close()
 
     def __enter__(self) -> "ProjectorLink":
         return self
@@ -142,133 +128,102 @@ class ProjectorLink:
     def __exit__(self, *exception: object) -> None:
         self.close()
 
+    def _power(self) -> PowerState:
+        if self._lighting and not self._lit():
+            return PowerState.WARMING
+        try:
+            answer = self._line.ask(Request(Verb.ASK_POWER))
+        except DeviceTimeoutError:
+            return self._expected() or PowerState.SILENT
+        if answer.kind is AnswerKind.BUSY:
+            return self._expected() or PowerState.WARMING
+        if not isinstance(answer.value, PowerState):
+            raise DeviceRefusedError(
+                f"The projector at {self._line.name} refuses to tell its power state. "
+                "Check that the dialect is the right one for this model."
+            )
+        warming = self._expected() is PowerState.WARMING and not self._dialect.tells_warming
+        if answer.value is PowerState.STANDBY and warming:
+            return PowerState.WARMING  # "off" is all that it can say until it is lit
+        if answer.value in (PowerState.ON, PowerState.STANDBY):
+            self._switching = None
+        return answer.value
+
+    def _ask_all(self, capabilities: tuple[Capability, ...] | dict[Capability, Verb]) -> dict:
+        found: dict[Capability, object] = {}
+        for capability in capabilities:
+            verb = _ASKED[capability]
+            if self._unknown[verb] >= ABSENT_AFTER:
+                continue
+            try:
+                answer = self._line.ask(Request(verb))
+            except DeviceTimeoutError:
+                return found
+            if answer.kind is AnswerKind.VALUE:
+                found[capability] = answer.value
+            elif answer.kind is AnswerKind.ABSENT and capabilities is _ASKED:
+                self._unknown[verb] += 1
+        return found
+
+    def _set(self, command: Verb, question: Verb, wanted: bool) -> None:
+        with self._lock:
+            self._line.begin()
+            self._command(Request(command))
+            answer = self._line.ask(Request(question))
+            if answer.kind is AnswerKind.VALUE and answer.value is not wanted:
+                raise DeviceRefusedError(
+                    f"The projector took the command but says {question} {answer.value} instead of {wanted}. "
+                    "Repeat it; some models drop it while the signal changes."
+                )
+
     def _command(self, request: Request) -> None:
-        if self._expected_state() is PowerState.WARMING and self.power() is PowerState.WARMING:
+        switches = request.verb in (Verb.POWER_ON, Verb.POWER_OFF)
+        if not switches and self._expected() is PowerState.WARMING and self._power() is PowerState.WARMING:
             raise DeviceRefusedError("The projector is still warming up. Wait until it is on, then repeat.")
-        answer = self._exchange(request)
+        if self._line.in_doubt:
+            self._line.ask(Request(Verb.ASK_POWER))  # replies come in order: late ones are past then
+        answer = self._line.exchange(request)
         if answer.kind is AnswerKind.DONE:
             return
-        reason = {
-            AnswerKind.ABSENT: "does not know this command or value; ask its status for what it knows",
-            AnswerKind.BUSY: "is busy switching; wait a minute, then repeat",
-        }.get(answer.kind, "refused; look at its indicators and at the wire log")
-        raise DeviceRefusedError(f"The projector at {self._port.name} {reason} ({request.verb}).")
+        if switches:
+            self._switching = None
+        reason = _REASONS[answer.kind]
+        raise DeviceRefusedError(f"The projector at {self._line.name} {reason} ({request.verb}).")
 
-    def _verify(self, verb: Verb, wanted: bool) -> None:
-        answer = self._ask(Request(verb))
-        if answer.kind is AnswerKind.VALUE and answer.value is not wanted:
+    def _light(self) -> None:
+        """Send the lighting; only a refusal comes soon."""
+        request = Request(Verb.POWER_ON)
+        self._line.send(request)
+        answer = self._line.listen(request, QUIET_S)
+        self._lighting = answer is None
+        if answer is not None and answer.kind is not AnswerKind.DONE:
+            self._switching = None
             raise DeviceRefusedError(
-                f"The projector took the command but says {verb} {answer.value} instead of {wanted}. "
-                "Repeat it; some models drop it while the signal changes."
+                f"The projector at {self._line.name} refuses to light its lamp. "
+                "Let it cool down, and look at its indicators."
             )
-
-    def _ask(self, request: Request) -> Answer:
-        if request.verb in self._absent:
-            return Answer(AnswerKind.ABSENT)
-        try:
-            return self._exchange(request)
-        except DeviceNotFoundError:
-            return self._exchange(request)  # asking twice harms nothing; the line is opened again
-
-    def _exchange(self, request: Request) -> Answer:
-        """Send and wait for the answer. Raises DeviceTimeoutError, or DeviceNotFoundError for a lost line."""
-        if self._dialect.encode(request) is None:
-            return Answer(AnswerKind.ABSENT)
-        self._send(request)
-        deadline_s = self._clock.now_s() + self._dialect.timeout_s
-        while self._clock.now_s() < deadline_s:
-            answer = self._listen(request, SLICE_S)
-            if answer is not None:
-                return answer
-        self._suspect = True
-        raise DeviceTimeoutError(
-            f"The projector at {self._port.name} did not answer {request.verb!s} within "
-            f"{self._dialect.timeout_s:g} s. Check that it has power and that port and speed are right."
-        )
-
-    def _send(self, request: Request) -> None:
-        try:
-            if not self._opened:
-                self._port.open()
-                self._opened, self._buffer = True, b""
-                self.log.add("!", f"opened {self._port.name}".encode())
-            if self._suspect:
-                self._settle()
-            data = self._dialect.encode(request) or b""
-            self.log.add(">", data)
-            self._port.write(data)
-        except DeviceNotFoundError:
-            self._lose()
-            raise
-
-    def _settle(self) -> None:
-        """Let a late answer pass: what comes now belongs to no request any more."""
-        quiet_s = 0.0
-        for _ in range(20):
-            chunk = self._port.read(SLICE_S)
-            self.log.add("<", chunk)
-            quiet_s = 0.0 if chunk else quiet_s + SLICE_S
-            if quiet_s >= QUIET_S:
-                break
-        self._buffer, self._suspect = b"", False
-
-    def _listen(self, request: Request, timeout_s: float) -> Answer | None:
-        try:
-            chunk = self._port.read(timeout_s)
-        except DeviceNotFoundError:
-            self._lose()
-            raise
-        self.log.add("<", chunk)
-        messages, self._buffer = self._dialect.split(self._buffer + chunk, idle=not chunk)
-        self._buffer = self._buffer[-4096:]
-        for message in messages:
-            answer = self._dialect.decode(request, message)
-            if answer.power is not None and not request.verb.asks:
-                self._note(answer.power)
-            if answer.kind is not AnswerKind.OTHER:
-                return answer
-        return None
-
-    def _lose(self) -> None:
-        self._port.close()
-        self._opened, self._buffer, self._lighting = False, b"", None
-        self.log.add("!", b"line lost")
 
     def _lit(self) -> bool:
         """Return whether the answer to the lighting has come, or its time is over."""
-        request = self._lighting
-        if request is None:
+        try:
+            answer = self._line.listen(Request(Verb.POWER_ON), 0.0)
+        except DeviceNotFoundError:
+            self._lighting = False
             return True
-        answer = self._listen(request, 0.0)
-        if answer is None and self._expected_state() is PowerState.WARMING:
+        if answer is None and self._expected() is PowerState.WARMING:
             return False
-        self._lighting = None
-        self._suspect = answer is None
+        self._lighting = False
+        if answer is None:
+            self._line.doubt()
         return True
 
-    def _light(self, request: Request) -> None:
-        """Send the lighting; only a refusal comes soon."""
-        self._send(request)
-        answer = self._listen(request, QUIET_S)
-        if answer is not None and answer.kind is not AnswerKind.DONE:
-            raise DeviceRefusedError(
-                f"The projector at {self._port.name} refuses to light its lamp. "
-                "Let it cool down, and look at its indicators."
-            )
-        self._lighting = request if answer is None else None
+    def _switch(self, state: PowerState, length_s: float) -> None:
+        self._switching = state, self._clock.now_s() + length_s
 
-    def _expected_state(self) -> PowerState | None:
+    def _expected(self) -> PowerState | None:
         if self._switching is None or self._clock.now_s() >= self._switching[1]:
             return None
         return self._switching[0]
-
-    def _note(self, state: PowerState) -> PowerState:
-        expected = self._expected_state()
-        if state is PowerState.STANDBY and expected is PowerState.WARMING and not self._dialect.tells_warming:
-            return expected  # "off" is all that it can say until it is lit
-        if state in (PowerState.ON, PowerState.STANDBY):
-            self._switching = None
-        return state
 
 
 def _status(power: PowerState, found: dict[Capability, object], on_s: float | None) -> ProjectorStatus:
@@ -280,7 +235,7 @@ def _status(power: PowerState, found: dict[Capability, object], on_s: float | No
         lamp_hours=_typed(found.get(Capability.LAMP_HOURS), int),
         errors=_typed(found.get(Capability.ERRORS), tuple) or (),
         name=_typed(found.get(Capability.NAME), str),
-        on_s=on_s if power is PowerState.ON else None,
+        on_s=on_s,
     )
 
 

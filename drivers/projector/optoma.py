@@ -19,8 +19,8 @@ _SETS = {
 }
 _ASKS = (Verb.HELLO, Verb.ASK_POWER, Verb.ASK_SOURCE, Verb.ASK_HOURS)
 _NEWS = {b"INFO0": PowerState.STANDBY, b"INFO1": PowerState.WARMING, b"INFO2": PowerState.COOLING}
-_MESSAGE = re.compile(rb"(?:OK[0-9A-Za-z]*|INFO\d|P|F)(?=[\r\n])")
-_LAST = re.compile(rb"(?:OK[0-9A-Za-z]*|INFO\d|P|F)(?=[\r\n]|$)")
+_MESSAGE = re.compile(rb"(?<![^\r\n])(?:OK[0-9A-Za-z]*|INFO\d|P|F)(?=[\r\n])")
+_LAST = re.compile(rb"(?<![^\r\n])(?:OK[0-9A-Za-z]*|INFO\d|P|F)(?=[\r\n]|$)")
 _INFO = re.compile(r"OK([01])(\d{4,5})(\d{2})\w{4}\d")
 
 

@@ -136,14 +136,16 @@ class SimulatedCamera:
     def _receive(self, fresh_after_s: float | None) -> Frame:
         """Return the next buffer that is fresh enough; with None, the next buffer must be consecutive."""
         while True:
-            index, arrival = self._deliver()
+            index, arrival, damaged = self._deliver()
             if fresh_after_s is None or not self._gate.is_stale(arrival, fresh_after_s):
                 break
         self._gate.admit(arrival, consecutive=fresh_after_s is None)
         pixels = self._draw(index)
+        if damaged:  # never reached while the gate does its work
+            pixels[len(pixels) // 2 :] = 0
         return Frame(pixels, arrival.sequence, arrival.exposed_s, self._noise.full_scale_counts)
 
-    def _deliver(self) -> tuple[int, Arrival]:
+    def _deliver(self) -> tuple[int, Arrival, bool]:
         """Return the number of the next frame that reaches the buffers, and what the buffer says."""
         if self._gone:
             raise DeviceNotFoundError(f"{self._name} is unplugged. Plug it in, then reconnect.")
@@ -155,11 +157,13 @@ class SimulatedCamera:
         self._next = index + 1
         self._raise_if_away(fault)
         self._clock.sleep_s(self._started_s + index * self._period_s + self._exposure_s - self._clock.now_s())
-        index -= fault is CameraFault.OLD_BUFFER
+        index -= fault is CameraFault.OLD_BUFFER and index > 0
         size = self._luminance.size * np.dtype(self._noise.dtype).itemsize
         bytes_used = size // 2 if fault is CameraFault.SHORT else size
         exposed_s = self._started_s + index * self._period_s
-        return index, Arrival(index - self._uncounted, exposed_s, fault is CameraFault.ERROR_FLAG, bytes_used)
+        flagged = fault is CameraFault.ERROR_FLAG
+        arrival = Arrival(index - self._uncounted, exposed_s, flagged, bytes_used)
+        return index, arrival, flagged or fault is CameraFault.SHORT
 
     def _raise_if_away(self, fault: CameraFault | None) -> None:
         if fault is CameraFault.STALL:

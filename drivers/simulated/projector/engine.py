@@ -84,7 +84,9 @@ class SimulatedProjector:
 
     def _send(self, data: bytes, delay_s: float = 0.0) -> None:
         if data:
-            self._outbox.append((self.responder.state.clock.now_s() + delay_s, data))
+            # A busy projector answers in order: nothing overtakes a late reply.
+            last_s = self._outbox[-1][0] if self._outbox else float("-inf")
+            self._outbox.append((max(last_s, self.responder.state.clock.now_s() + delay_s), data))
 
     def _noise(self) -> bytes:
         # Above ASCII: what a wrong level or a loose plug makes of text, and never a message by accident.
