@@ -1,4 +1,8 @@
 """Fields of excess refractivity: on a grid (trilinear, cubic), from a network, from a formula."""
 
 from core.fields.field import AbstractField as AbstractField
+from core.fields.formula import FunctionField as FunctionField
 from core.fields.grid import GridField as GridField
+from core.fields.plume import plume as plume
+from core.fields.spline import SplineField as SplineField
+from core.fields.spline import through_vertices as through_vertices

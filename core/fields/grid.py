@@ -1,6 +1,7 @@
 """A field on the vertices of the room, trilinear between them."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -45,56 +46,53 @@ class GridField(AbstractField):
 
     def excess(self, points_m: Float[Array, "points 3"]) -> Float[Array, " points"]:
         """Trilinear value at each point."""
-        corners, fraction = self._cells(points_m)
-        for axis in (2, 1, 0):
-            corners = _blend(corners, fraction[:, axis])
-        return corners[0]
+        return _interpolate(*self._cells(points_m))[0]
 
     def excess_and_gradient(
         self, points_m: Float[Array, "points 3"]
     ) -> tuple[Float[Array, " points"], Float[Array, "points 3"]]:
         """Trilinear value and the gradient of the interpolant."""
-        corners, fraction = self._cells(points_m)
-        fx, fy, fz = fraction[:, 0], fraction[:, 1], fraction[:, 2]
-        dx, dy, dz = self.spacing_m
-        flat_z = _blend(corners, fz)
-        flat_yz = _blend(flat_z, fy)
-        slope_z = [high - low for low, high in zip(corners[::2], corners[1::2], strict=True)]
-        slope_y = [flat_z[1] - flat_z[0], flat_z[3] - flat_z[2]]
-        gradient = jnp.stack(
-            [
-                (flat_yz[1] - flat_yz[0]) / dx,
-                _blend(slope_y, fx)[0] / dy,
-                _blend(_blend(slope_z, fy), fx)[0] / dz,
-            ],
-            axis=-1,
-        )
-        return _blend(flat_yz, fx)[0], gradient
+        value, slopes = _interpolate(*self._cells(points_m))
+        per_m = jnp.asarray([1.0 / d for d in self.spacing_m], points_m.dtype)
+        return value, slopes * per_m[None]
 
     def _cells(
         self, points_m: Float[Array, "points 3"]
-    ) -> tuple[list[Float[Array, " points"]], Float[Array, "points 3"]]:
-        """The eight corner values in the order 000, 001, 010, ... (x slowest) and the place in the cell."""
+    ) -> tuple[Float[Array, "points 2 2 2"], Float[Array, "points 3"]]:
+        """The corners of each point's cell and its place in the cell, 0 to 1."""
         dtype = points_m.dtype
-        shape = self.values.shape
-        last = jnp.asarray([n - 2 for n in shape], jnp.int32)
+        last = jnp.asarray([n - 2 for n in self.values.shape], jnp.int32)
         lower = jnp.asarray(self.lower_m, dtype)
-        scale = jnp.asarray([1.0 / d for d in self.spacing_m], dtype)
-        position = (points_m - lower[None]) * scale[None]
-        cell = jnp.clip(jnp.floor(position).astype(jnp.int32), 0, last[None])
-        fraction = jnp.clip(position - cell.astype(dtype), 0.0, 1.0)
-        base = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]
-        flat = jnp.asarray(self.values).reshape(-1)
-        strides = [(i * shape[1] + j) * shape[2] + k for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-        return [_take(flat, base + stride) for stride in strides], fraction
+        per_m = jnp.asarray([1.0 / d for d in self.spacing_m], dtype)
+        position = hold((points_m - lower[None]) * per_m[None], last + 1)
+        cell = jnp.clip(position.astype(jnp.int32), 0, last[None])
+        return gather_blocks(jnp.asarray(self.values).astype(dtype), cell, 2), position - cell.astype(dtype)
 
 
-def _take(flat: Float[Array, " vertices"], index: Int[Array, " points"]) -> Float[Array, " points"]:
-    return flat.at[index].get(mode="promise_in_bounds")
+def hold(position: Float[Array, "points 3"], last: Int[Array, "3"]) -> Float[Array, "points 3"]:
+    """The position, held at the outer faces; on a face its derivative is 1, where `clip` would give 1/2."""
+    end = last.astype(position.dtype)[None]
+    return jnp.where(position < 0.0, 0.0, jnp.where(position > end, end, position))
 
 
-def _blend(
-    values: list[Float[Array, " points"]], fraction: Float[Array, " points"]
-) -> list[Float[Array, " points"]]:
-    """Interpolate neighbours in pairs: half as many values."""
-    return [low + fraction * (high - low) for low, high in zip(values[::2], values[1::2], strict=True)]
+def gather_blocks(
+    values: Float[Array, "nx ny nz"], first: Int[Array, "points 3"], size: int
+) -> Float[Array, "points size size size"]:
+    """The block of `size`^3 vertices that starts at each index: one gather, transposed one scatter."""
+    numbers = jax.lax.GatherDimensionNumbers((1, 2, 3), (), (0, 1, 2))
+    return jax.lax.gather(values, first, numbers, (size, size, size), mode="promise_in_bounds")
+
+
+def _interpolate(
+    corners: Float[Array, "points 2 2 2"], fraction: Float[Array, "points 3"]
+) -> tuple[Float[Array, " points"], Float[Array, "points 3"]]:
+    """Value and slopes per cell, blending the axes from the last to the first."""
+    fx, fy, fz = fraction[:, 0], fraction[:, 1], fraction[:, 2]
+    step_z = corners[..., 1] - corners[..., 0]
+    on_z = corners[..., 0] + fz[:, None, None] * step_z
+    step_y = on_z[..., 1] - on_z[..., 0]
+    on_yz = on_z[..., 0] + fy[:, None] * step_y
+    slope_z = step_z[..., 0] + fy[:, None] * (step_z[..., 1] - step_z[..., 0])
+    slope_x = on_yz[:, 1] - on_yz[:, 0]
+    slopes = [slope_x, *(s[:, 0] + fx * (s[:, 1] - s[:, 0]) for s in (step_y, slope_z))]
+    return on_yz[:, 0] + fx * slope_x, jnp.stack(slopes, axis=-1)

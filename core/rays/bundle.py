@@ -45,16 +45,19 @@ def clip_ray(
     A ray along a face counts as inside; one that starts inside enters where it starts.
     """
     lower, upper = jnp.asarray(room.lower_m, origin_m.dtype), jnp.asarray(room.upper_m, origin_m.dtype)
-    tiny = jnp.finfo(direction.dtype).tiny
-    # A component of exactly zero would give 0 / 0 on a face; a tiny one gives a huge, correct parameter.
-    safe = jnp.where(jnp.abs(direction) < tiny, tiny, direction)
+    # Along an axis that the ray does not move on, it is inside for ever or never: no 0 / 0 on a face.
+    parallel = jnp.abs(direction) < jnp.finfo(direction.dtype).tiny
+    within = jnp.where((origin_m >= lower) & (origin_m <= upper), -jnp.inf, jnp.inf)
+    safe = jnp.where(parallel, 1.0, direction)
     first, second = (lower - origin_m) / safe, (upper - origin_m) / safe
-    enter = jnp.maximum(jnp.max(jnp.minimum(first, second)), 0.0)
-    leave_axes = jnp.maximum(first, second)
+    enter = jnp.maximum(jnp.max(jnp.where(parallel, within, jnp.minimum(first, second))), 0.0)
+    leave_axes = jnp.where(parallel, -within, jnp.maximum(first, second))
     leave = jnp.min(leave_axes)
     misses = leave <= enter
     # The back wall wins a tie on an edge: the pattern reaches to the corners.
     to_wall = (direction[1] > 0) & (leave_axes[1] <= leave)
     outcome = jnp.where(misses, RayOutcome.missed, jnp.where(to_wall, RayOutcome.wall, RayOutcome.side))
-    entry = jnp.where(misses, jnp.clip(origin_m, lower, upper), origin_m + enter * direction)
-    return entry, jnp.where(misses, 0.0, leave - enter), outcome.astype(jnp.int32)
+    enter, leave = (jnp.where(misses, 0.0, t) for t in (enter, leave))
+    # A ray that misses stands still at the nearest point of the room.
+    entry = jnp.clip(origin_m + enter * direction, lower, upper)
+    return entry, leave - enter, outcome.astype(jnp.int32)

@@ -1,11 +1,7 @@
-"""Rendered images: the reference, and the one with flow, at the same sample positions.
+"""Whole images in bounded memory: a block of rows at a time, rays shared where the field allows.
 
-    I_j = sum_s w_s L(c(s) + shift(s)) cos / r        (paper, eq. 2)
-
-A zero field gives exactly the reference, bit for bit: both go through the same arithmetic.
+A zero field gives exactly the reference, bit for bit: one compiled program exposes both.
 """
-
-from functools import lru_cache
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -13,67 +9,94 @@ import numpy as np
 from jaxtyping import Array, Float, Float32
 
 from core.fields import AbstractField
-from core.pattern import make_pattern
-from core.rays.straight import StraightTracer
-from core.rays.tracer import AbstractRayTracer
-from core.render.geometry import PixelGeometry, pixel_geometry
-from core.render.light import pattern_size, sample_pattern
+from core.render.choice import RenderChoice, choose
+from core.render.geometry import pixel_geometry
+from core.render.light import pattern_image
 from core.render.pixel_filter import quadrature
-from core.render.shift import pattern_offset_px, wall_offset_m
-from core.scene import Pattern, Scene
+from core.render.pixels import Exposure, lens_points, pattern_motion
+from core.scene import Scene
 
-_RAYS_A_BLOCK = 2**18
-_STEPS = 64
-_SAMPLES = 4
+_PIXELS_A_BLOCK = 2**18
 
 
 def render_reference(scene: Scene, view: int = 0) -> Float32[np.ndarray, "rows cols"]:
-    """Luminance of the pattern through air at rest, about 0 to 1."""
+    """Luminance of the pattern through air at rest, about 0 to 1: pattern times cos / r over its maximum."""
     return _render(scene, view, None)
 
 
 def render_flow(scene: Scene, field: AbstractField, view: int = 0) -> Float32[np.ndarray, "rows cols"]:
-    """Luminance of the pattern through the flow, about 0 to 1."""
+    """Luminance of the pattern through the flow; `scene.rays` says how rays are traced (`choose`)."""
     return _render(scene, view, field)
 
 
 def _render(scene: Scene, view: int, field: AbstractField | None) -> Float32[np.ndarray, "rows cols"]:
     camera = scene.views[view].camera
-    pattern = jnp.asarray(_pattern(scene.light.pattern, *pattern_size(scene)))
-    tracer = StraightTracer(_STEPS, scene.air.ambient_refractivity)
-    rows_a_block = max(1, _RAYS_A_BLOCK // camera.width_px)
+    choice = choose(scene, view, field)
+    pattern = jnp.asarray(pattern_image(scene))
+    offsets, weights = (jnp.asarray(a, jnp.float32) for a in quadrature(choice.samples))
+    # As many rows for the reference as for the flow, whatever its stride, so that both run one program.
+    rows = min(max(1, _PIXELS_A_BLOCK // camera.width_px), camera.height_px)
     image = np.zeros((camera.height_px, camera.width_px), np.float32)
-    for first in range(0, camera.height_px, rows_a_block):
-        rows = min(rows_a_block, camera.height_px - first)
-        row, column = np.mgrid[first : first + rows, 0 : camera.width_px]
-        pixels = np.stack([column.ravel(), row.ravel()], axis=1).astype(float)
-        geometry = pixel_geometry(scene, view, pixels)
-        shift_px = jnp.zeros_like(geometry.fraction_px) if field is None else _shift(geometry, field, tracer)
-        image[first : first + rows] = np.asarray(_expose(pattern, geometry, shift_px)).reshape(rows, -1)
+    for first in range(0, camera.height_px, rows):
+        geometry = pixel_geometry(scene, view, _raster(first, rows, camera.width_px, 1))
+        exposure = Exposure(geometry, offsets[:, None], weights)
+        lit = np.zeros(rows * camera.width_px, np.float32)
+        points = lens_points(choice)
+        for point in points:
+            motion = exposure.still
+            if field is not None:
+                motion = jnp.broadcast_to(
+                    _motion(scene, view, field, choice, point, first, rows), motion.shape
+                )
+            lit += np.asarray(_expose(exposure, pattern, motion)) / len(points)
+        image[first : first + rows] = lit.reshape(rows, -1)[: camera.height_px - first]
     return image
 
 
-@eqx.filter_jit
-def _shift(
-    geometry: PixelGeometry, field: AbstractField, tracer: AbstractRayTracer
-) -> Float[Array, "rays 2"]:
-    return pattern_offset_px(geometry, wall_offset_m(geometry, field, tracer))
+def _motion(
+    scene: Scene, view: int, field: AbstractField, choice: RenderChoice,
+    point: tuple[float, float], first: int, rows: int,
+) -> Float[Array, "samples_or_1 pixels 3"]:  # fmt: skip
+    """The pattern's motion of a block: from a ray a sample, or from rays every `stride` pixels."""
+    width, stride = scene.views[view].camera.width_px, choice.stride
+    if not stride:
+        pixels = _raster(first, rows, width, 1)
+        geometries = [pixel_geometry(scene, view, pixels + o, point) for o in quadrature(choice.samples)[0]]
+        return jnp.stack([_traced(g, field, choice) for g in geometries])
+    lattice = _raster(first, rows + 2 * stride - 1, width + 2 * stride - 1, stride)
+    geometry = pixel_geometry(scene, view, lattice, point)
+    lattice_cols = len(np.arange(0, width + 2 * stride - 1, stride))
+    motion = _traced(geometry, field, choice)
+    return _spread_motion(motion, geometry.weight > 0, (lattice_cols, stride, rows, width))[None]
+
+
+def _raster(first_row: int, rows: int, cols: int, stride: int) -> Float[np.ndarray, "pixels 2"]:
+    row, column = np.mgrid[first_row : first_row + rows : stride, 0:cols:stride]
+    return np.stack([column.ravel(), row.ravel()], axis=1).astype(float)
+
+
+_traced = eqx.filter_jit(pattern_motion)
 
 
 @eqx.filter_jit
-def _expose(
-    pattern: Float[Array, "rows cols"], geometry: PixelGeometry, shift_px: Float[Array, "rays 2"]
-) -> Float[Array, " rays"]:
-    """Filter the pattern over the pixel; the samples of a pixel share its ray's shift."""
-    offsets, weights = quadrature(_SAMPLES)
-    total = jnp.zeros_like(geometry.weight)
-    for offset, weight in zip(offsets, weights, strict=True):
-        step_px = geometry.pattern_from_pixel @ jnp.asarray(offset, jnp.float32)
-        place_px = geometry.fraction_px + step_px + shift_px
-        total = total + float(weight) * sample_pattern(pattern, geometry.cell, place_px)
-    return total * geometry.weight
+def _expose(exposure: Exposure, pattern: Array, motion: Array) -> Float[Array, " pixels"]:
+    return exposure.luminance(pattern, motion)
 
 
-@lru_cache(maxsize=2)
-def _pattern(pattern: Pattern, rows: int, cols: int) -> Float32[np.ndarray, "rows cols"]:
-    return make_pattern(pattern, rows, cols)
+@eqx.filter_jit
+def _spread_motion(
+    motion: Float[Array, "lattice 3"], lit: Array, layout: tuple[int, int, int, int]
+) -> Float[Array, "pixels 3"]:
+    """Bilinear between the rays of the lattice; rays that see no pattern are left out of the mean."""
+    cols, stride, rows, width = layout
+    known = lit.astype(motion.dtype)[:, None]
+    values = jnp.concatenate([motion * known, known], axis=1).reshape(-1, cols, 4)
+    full = _spread(_spread(values, stride).swapaxes(0, 1), stride).swapaxes(0, 1)[:rows, :width]
+    return (full[..., :3] / jnp.maximum(full[..., 3:], 1e-6)).reshape(-1, 3)
+
+
+def _spread(values: Float[Array, "n m c"], stride: int) -> Float[Array, "fine m c"]:
+    """Linear interpolation between neighbours along the first axis, `stride` values each."""
+    share = (jnp.arange(stride).astype(values.dtype) / stride)[None, :, None, None]
+    low, high = values[:-1, None], values[1:, None]
+    return (low + share * (high - low)).reshape(-1, *values.shape[1:])

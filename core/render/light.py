@@ -1,16 +1,18 @@
 """Where a point of the back wall looks in the pattern: a print on the wall, or a projector's panel."""
 
 from abc import abstractmethod
+from functools import lru_cache
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Float32
 
 from core.geometry import Box
+from core.pattern import make_pattern
 from core.rays.optics import Pinhole, pinhole
-from core.scene import FixedTexture, Scene
+from core.scene import FixedTexture, Pattern, Scene
 
 
 class AbstractPatternMap(eqx.Module):
@@ -73,6 +75,16 @@ def pattern_size(scene: Scene) -> tuple[int, int]:
 def texture_size(room: Box, pixel_m: float) -> tuple[int, int]:
     """Rows and columns of a print of `pixel_m` that covers the back wall."""
     return int(np.ceil(room.size_m[2] / pixel_m)), int(np.ceil(room.size_m[0] / pixel_m))
+
+
+def pattern_image(scene: Scene) -> Float32[np.ndarray, "rows cols"]:
+    """The scene's pattern at its own resolution, 0 to 1; the last two are kept."""
+    return _made(scene.light.pattern, *pattern_size(scene))
+
+
+@lru_cache(maxsize=2)
+def _made(pattern: Pattern, rows: int, cols: int) -> Float32[np.ndarray, "rows cols"]:
+    return make_pattern(pattern, rows, cols)
 
 
 def sample_pattern(
