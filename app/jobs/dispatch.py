@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from app.jobs.folder import Owner
-from app.jobs.ledger import Ledger, log_event
+from app.jobs.ledger import Ledger
 from app.jobs.records import Job, job_of
+from app.jobs.requests import log_event
 from app.jobs.state import ACTIVE, JobState
 
 _FREE = "device = NULL, handle = NULL, stop_asked_s = NULL"

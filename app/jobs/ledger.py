@@ -17,6 +17,7 @@ from app.durable import make_folder, write_json
 from app.jobs import kinds
 from app.jobs.errors import JobError, UnknownJobError
 from app.jobs.records import Event, Group, Job, JobSpec, event_of, job_of
+from app.jobs.requests import Request, ask, log_event, move_before, requeue, state_of
 from app.jobs.state import JobState
 from app.jobs.store import Store
 
@@ -140,75 +141,47 @@ class Ledger:
     def cancel(self, job: str) -> Job:
         """Stop the job: it keeps its checkpoint and may be retried. Raises JobError when it has ended."""
         waiting = (JobState.queued, JobState.lost, JobState.paused)
-        return self._ask(job, waiting, JobState.cancelled, JobState.cancelling, "cancel")
+        with self.store.transaction() as database:
+            ask(database, job, Request("cancel", waiting, JobState.cancelled, JobState.cancelling))
+        return self.get(job)
 
     def pause(self, job: str) -> Job:
         """Stop the job at a checkpoint until `resume`."""
-        return self._ask(job, (JobState.queued, JobState.lost), JobState.paused, JobState.pausing, "pause")
+        waiting = (JobState.queued, JobState.lost)
+        with self.store.transaction() as database:
+            ask(database, job, Request("pause", waiting, JobState.paused, JobState.pausing))
+        return self.get(job)
 
     def resume(self, job: str) -> Job:
         """Queue a paused job again; it goes on from its checkpoint."""
-        return self._requeue(job, (JobState.paused,), "resume")
+        with self.store.transaction() as database:
+            requeue(database, job, (JobState.paused,), "resume")
+        return self.get(job)
 
     def retry(self, job: str) -> Job:
         """Queue a failed, cancelled or lost job again; it goes on from its checkpoint."""
-        return self._requeue(job, (JobState.failed, JobState.cancelled, JobState.lost), "retry")
+        with self.store.transaction() as database:
+            requeue(database, job, (JobState.failed, JobState.cancelled, JobState.lost), "retry")
+        return self.get(job)
 
     def set_priority(self, job: str, priority: int) -> Job:
         """Higher priorities start first; equal ones in their order."""
         with self.store.transaction() as database:
+            state_of(database, job)
             database.execute("UPDATE jobs SET priority = ? WHERE id = ?", (priority, job))
-            log_event(database, self.get(job).id, 0, "priority", {"priority": priority})
+            log_event(database, job, 0, "priority", {"priority": priority})
         return self.get(job)
 
     def move_before(self, job: str, other: str | None = None) -> Job:
         """Put the job before `other` (before all when None), at that job's priority."""
         with self.store.transaction() as database:
-            waiting = [row for row in self.jobs(states=(JobState.queued,)) if row.id != job]
-            names = [row.id for row in waiting]
-            if other is not None and other not in names:
-                raise JobError(f"Job {other!r} is not in the queue, so nothing can be put before it.")
-            at = names.index(other) if other else 0
-            priority = waiting[at].priority if waiting else self.get(job).priority
-            names.insert(at, self.get(job).id)
-            for position, name in enumerate(names, start=1):
-                database.execute("UPDATE jobs SET position = ? WHERE id = ?", (position, name))
-            database.execute("UPDATE jobs SET priority = ? WHERE id = ?", (priority, job))
-            log_event(database, job, 0, "order", {"before": other})
+            move_before(database, job, other)
         return self.get(job)
 
     def append_event(self, kind: str, body: Mapping[str, Any], *, job: str | None = None) -> int:
         """Append an event that does not come from a worker (devices, log); return its id."""
         with self.store.transaction() as database:
             return log_event(database, job, 0, kind, body)
-
-    def _ask(self, job: str, waiting: Sequence[JobState], now: JobState, later: JobState, word: str) -> Job:
-        with self.store.transaction() as database:
-            state = self.get(job).state
-            if state in waiting:
-                sql = "UPDATE jobs SET state = ?, retry_at_s = NULL, finished_s = ?, reason = '' WHERE id = ?"
-                database.execute(sql, (now, time.time() if now.is_finished else None, job))
-                log_event(database, job, 0, "state", {"state": now})
-            elif state is JobState.running or (state is JobState.pausing and later is JobState.cancelling):
-                sql = "UPDATE jobs SET state = ?, stop_asked_s = COALESCE(stop_asked_s, ?) WHERE id = ?"
-                database.execute(sql, (later, time.time(), job))
-                log_event(database, job, 0, "state", {"state": later})
-            elif state not in (now, later):
-                raise JobError(f"Job {job} is {state}: there is nothing to {word}.")
-        return self.get(job)
-
-    def _requeue(self, job: str, allowed: Sequence[JobState], word: str) -> Job:
-        with self.store.transaction() as database:
-            state = self.get(job).state
-            if state not in allowed:
-                raise JobError(f"Job {job} is {state}; only {', '.join(allowed)} can {word}.")
-            sql = (
-                "UPDATE jobs SET state = 'queued', losses = 0, retry_at_s = NULL, stop_asked_s = NULL, "
-                "finished_s = NULL, reason = '' WHERE id = ?"
-            )
-            database.execute(sql, (job,))
-            log_event(database, job, 0, "state", {"state": JobState.queued})
-        return self.get(job)
 
     def _submitted_as(self, key: str | None) -> Job | None:
         rows = self.store.rows("SELECT * FROM jobs WHERE submit_key = ?", (key,)) if key else []
@@ -237,18 +210,3 @@ def _row_of(spec: JobSpec, key: str | None, group: str | None) -> dict[str, Any]
         "priority": spec.priority,
         "now_s": time.time(),
     }
-
-
-def log_event(
-    database: sqlite3.Connection,
-    job: str | None,
-    attempt: int,
-    kind: str,
-    body: Mapping[str, Any],
-    *,
-    at_s: float | None = None,
-) -> int:
-    """Append an event within a transaction; return its id."""
-    values = (job, attempt, time.time() if at_s is None else at_s, kind, json.dumps(body, allow_nan=False))
-    sql = "INSERT INTO events (job_id, attempt, at_s, kind, body) VALUES (?, ?, ?, ?, ?)"
-    return database.execute(sql, values).lastrowid or 0

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import threading
 import time
@@ -162,6 +163,15 @@ def test_a_failure_is_told_in_words_and_not_tried_again(ledger: Ledger):
     with Running(ledger):
         until_state(ledger, job, JobState.failed)
     assert "greater than or equal to 1" in ledger.get(job.id).reason
+
+
+def test_a_job_whose_folder_was_deleted_fails_and_the_others_go_on(ledger: Ledger):
+    gone, greedy = ledger.submit(study()), ledger.submit(study(memory_bytes=1 << 60))
+    shutil.rmtree(ledger.folder_of(gone.id))
+    Supervisor(ledger, JobsConfig()).round()
+    assert ledger.get(gone.id).state is JobState.failed
+    assert "is gone" in ledger.get(gone.id).reason
+    assert ledger.get(greedy.id).reason.startswith("Waiting for memory")
 
 
 def _lock(ledger: Ledger, job: Job, attempt: int) -> Path:
