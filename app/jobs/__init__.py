@@ -1,5 +1,6 @@
 """Jobs: a ledger that loses nothing, a supervisor, and engines that only start and stop processes."""
 
+from app.jobs.attended import attended
 from app.jobs.config import JobsConfig, read_config
 from app.jobs.errors import EngineError, FencedError, JobError, LedgerError, UnknownJobError
 from app.jobs.ledger import Ledger
@@ -23,6 +24,7 @@ __all__ = [
     "Summary",
     "Supervisor",
     "UnknownJobError",
+    "attended",
     "read_config",
     "submit_ensemble",
     "submit_sweep",
