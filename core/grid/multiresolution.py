@@ -12,7 +12,8 @@ from jaxtyping import Array, Float
 from core.boussinesq import Flow, Numbers, Residuals
 from core.grid.interpolation import on_axes
 from core.grid.residuals import as_residuals, discrete_residuals
-from core.grid.staggered import Axes, Staggered, StaggeredGrid
+from core.grid.staggered import Staggered, StaggeredGrid
+from core.representation import Spans, positions
 
 
 class MultiGrid(eqx.Module):
@@ -33,17 +34,9 @@ class MultiGrid(eqx.Module):
             total = jax.tree.map(jnp.add, prolong(total, coarse, fine), level)
         return total
 
-    def on_grid(self, axes: Axes) -> Flow:
-        """T, p, u on a tensor grid of points."""
-        return self.finest.on_grid(self.state(), axes)
-
-    def at(self, points_nd: Float[Array, "points 3"]) -> Flow:
-        """T, p, u at scattered points."""
-        return self.finest.at(self.state(), points_nd)
-
-    def residuals(self, numbers: Numbers) -> Residuals:
-        """The discrete residuals of all cells."""
-        return as_residuals(discrete_residuals(self.state(), self.finest, numbers))
+    def fields(self) -> "GridFields":
+        """T, p, u of the sum of all levels."""
+        return GridFields(self.state(), self.finest)
 
     def refined(self, factor: int = 2) -> "MultiGrid":
         """The same state on one more level, which is zero."""
@@ -51,6 +44,26 @@ class MultiGrid(eqx.Module):
         cells = tuple(factor * n if n > 1 else 1 for n in old.cells)
         fine = StaggeredGrid(old.lower, old.upper, (cells[0], cells[1], cells[2]))
         return MultiGrid((*self.levels, fine.zeros()), (*self.grids, fine))
+
+
+class GridFields(eqx.Module):
+    """T, p, u of a staggered state: see `core.representation.Fields`."""
+
+    state: Staggered
+    grid: StaggeredGrid
+
+    def at(self, points_nd: Float[Array, "points 3"]) -> Flow:
+        """T, p, u at scattered points, trilinear."""
+        return self.grid.at(self.state, points_nd)
+
+    def on_grid(self, spans: Spans) -> Flow:
+        """T, p, u on a tensor grid of points, trilinear."""
+        x, y, z = (positions(span) for span in spans)
+        return self.grid.on_grid(self.state, (x, y, z))
+
+    def residuals(self, numbers: Numbers, points_nd: Float[Array, "points 3"] | None) -> Residuals:
+        """The discrete residuals of all cells and inner faces; `points_nd` is not used."""
+        return as_residuals(discrete_residuals(self.state, self.grid, numbers))
 
 
 def prolong(state: Staggered, coarse: StaggeredGrid, fine: StaggeredGrid) -> Staggered:

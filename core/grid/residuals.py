@@ -55,14 +55,13 @@ def _momentum(c: int, state: Staggered, grid: StaggeredGrid, numbers: Numbers) -
 
 
 def _heat(state: Staggered, grid: StaggeredGrid, numbers: Numbers) -> Volume:
-    total = None
+    total = jnp.zeros(grid.cells, state.temperature.dtype)
     for axis in range(3):
         across = _inner(state.temperature, _others(axis))
         carrier = _inner(state.velocity[axis], _others(axis))
         slope = _difference(across, axis) / grid.spacing[axis]
         flux = _mean(across, axis) * carrier - slope / numbers.peclet
-        part = _difference(flux, axis) / grid.spacing[axis]
-        total = part if total is None else total + part
+        total = total + _difference(flux, axis) / grid.spacing[axis]
     return total
 
 

@@ -18,7 +18,7 @@ from core.grid.interpolation import at_points, interpolation_matrix, on_axes
 
 Corner = tuple[float, float, float]
 Shape = tuple[int, int, int]
-Axes = tuple[Float[np.ndarray, " nx"], Float[np.ndarray, " ny"], Float[np.ndarray, " nz"]]
+Axes = tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"], Float[np.ndarray, " _"]]
 Volume = Float[Array, "_ _ _"]
 
 

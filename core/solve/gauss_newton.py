@@ -27,7 +27,8 @@ class Step(eqx.Module):
     cg_iterations: Float[Array, ""]
 
 
-@eqx.filter_jit
+# Half the compile time of the default level; the same run time, measured on the room at 32^3.
+@eqx.filter_jit(compiler_options={"xla_backend_optimization_level": 1})  # pyright: ignore
 def gauss_newton_step(
     residual: ResidualFunction,
     unknowns: PyTree,
@@ -61,13 +62,20 @@ def gauss_newton_step(
 def _column_scale(product: Callable[[PyTree], PyTree], unknowns: PyTree) -> PyTree:
     """One over the root mean square column norm of J, leaf by leaf; 1 where a leaf moves nothing."""
     leaves, tree = jax.tree.flatten(unknowns)
-    scales = []
-    for place, leaf in enumerate(leaves):
-        signs = jax.random.rademacher(jax.random.key(place), leaf.shape, leaf.dtype)
-        probe = [signs if p == place else jnp.zeros_like(other) for p, other in enumerate(leaves)]
-        norm = 2.0 * _half_square(product(jax.tree.unflatten(tree, probe))) / max(leaf.size, 1)
-        scales.append(jnp.where(norm > 0, jax.lax.rsqrt(jnp.maximum(norm, 1e-30)), 1.0))
-    return jax.tree.unflatten(tree, scales)
+    signs = [
+        jax.random.rademacher(jax.random.key(place), leaf.shape, leaf.dtype)
+        for place, leaf in enumerate(leaves)
+    ]
+
+    def square(chosen: Float[Array, " leaves"]) -> Float[Array, ""]:
+        probe = [sign * on for sign, on in zip(signs, chosen, strict=True)]
+        return 2.0 * _half_square(product(jax.tree.unflatten(tree, probe)))
+
+    # A loop, not fifteen copies of the linearised residuals in one program.
+    norms = jax.lax.map(square, jnp.eye(len(leaves), dtype=leaves[0].dtype))
+    norms = norms / jnp.array([max(leaf.size, 1) for leaf in leaves], norms.dtype)
+    scales = jnp.where(norms > 0, jax.lax.rsqrt(jnp.maximum(norms, 1e-30)), 1.0)
+    return jax.tree.unflatten(tree, list(scales))
 
 
 def _conjugate_gradients(
@@ -95,7 +103,7 @@ def _conjugate_gradients(
 
 
 def _dot(a: PyTree, b: PyTree) -> Float[Array, ""]:
-    return sum(jax.tree.leaves(jax.tree.map(lambda x, y: jnp.vdot(x, y), a, b)), start=jnp.float32(0))
+    return jnp.stack(jax.tree.leaves(jax.tree.map(jnp.vdot, a, b))).sum()
 
 
 def _half_square(r: PyTree) -> Float[Array, ""]:
