@@ -4,6 +4,7 @@ Rows rather than a scalar, so that a Gauss-Newton method can use the same losses
 Each `rows` takes a key for a random mini-batch, or None for everything. A regime is a list of losses.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
@@ -61,6 +62,10 @@ class PhysicsLoss(eqx.Module):
             for gamma, part in zip(self.gamma, (left.mass, left.momentum, left.heat), strict=True)
         )
 
+    def with_batch(self, points: int) -> "PhysicsLoss":
+        """The same on mini-batches of `points`."""
+        return dataclasses.replace(self, points=points)
+
 
 class Patch(eqx.Module):
     """Known values on a tensor grid of points; with `minus`, known differences to a second one.
@@ -105,6 +110,10 @@ class BoundaryLoss(eqx.Module):
         scale = (self.weight / chosen.shape[0]) ** 0.5
         pick = jax.tree.map(lambda a: a[chosen], (target, weight))
         return tuple(scale * row for row in _errors(found, *pick))
+
+    def with_batch(self, points: int) -> "BoundaryLoss":
+        """The same on mini-batches of `points`."""
+        return dataclasses.replace(self, points=points)
 
     def _flattened(self) -> tuple[Float[Array, "points 3"], Flow, Flow]:
         points = jnp.concatenate([jnp.asarray(points_of(p.spans), jnp.float32) for p in self.patches])

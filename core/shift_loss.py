@@ -10,6 +10,8 @@ are rows  (g · d − b) / σ  at sensor positions:
 The model's d comes from the air's temperature on the vertices of the room by straight rays.
 """
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -47,13 +49,8 @@ class ShiftRows(eqx.Module):
         """The same for some of the rows."""
         first = rows * self.samples
         positions = (first[:, None] + jnp.arange(self.samples)[None]).reshape(-1)
-        operator = StraightRayOperator(
-            self.operator.shape,
-            tuple(v[positions] for v in self.operator.vertex),
-            tuple(w[positions] for w in self.operator.weight_px),
-        )
         return ShiftRows(
-            operator,
+            self.operator.chosen(positions),
             self.matrix[positions],
             self.target[rows],
             self.similarity[positions],
@@ -88,6 +85,10 @@ class ShiftLoss(eqx.Module):
             errors = view.errors(excess, drift)
             found.append((self.weight / (errors.size * len(self.views))) ** 0.5 * errors)
         return tuple(found)
+
+    def with_batch(self, pixels: int) -> "ShiftLoss":
+        """The same on mini-batches of `pixels` rows a view."""
+        return dataclasses.replace(self, pixels=pixels)
 
 
 def displacement_rows(

@@ -124,7 +124,8 @@ def _check_sensors(problem: Problem) -> None:
             if not problem.scene.room.contains((x, y, z)):
                 raise SettingError(
                     f"A sensor at ({x:g}, {y:g}, {z:g}) m is outside the room "
-                    f"{problem.scene.room.lower_m} to {problem.scene.room.upper_m} m. Check its position and unit."
+                    f"{problem.scene.room.lower_m} to {problem.scene.room.upper_m} m. "
+                    "Check its position and its unit."
                 )
         known = np.isfinite(sensor.temperature_k)
         if (np.asarray(sensor.temperature_std_k)[known] <= 0).any():

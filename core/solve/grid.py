@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
@@ -24,6 +23,7 @@ from core.solve.check import check_problem
 from core.solve.frame import Frame, frame_of
 from core.solve.gauss_newton import Step, gauss_newton_step
 from core.solve.regime import DataModel, Regime, Weights, losses_of
+from core.solve.solution import solution_of
 
 OnEvent = Callable[[dict[str, Any]], object]
 
@@ -34,7 +34,7 @@ class GridSettings:
 
     regime: Regime = "bos+pde+boundary"
     cells: int = 32
-    coarsest: int = 8
+    coarsest: int = 16
     steps_a_level: int = 6
     cg_iterations: int = 60
     settled: float = 0.02
@@ -166,36 +166,3 @@ def _record(step: Step, unknowns: Unknowns, started: float, damping: float) -> d
         "damping": damping,
         "elapsed_s": time.perf_counter() - started,
     }
-
-
-@eqx.filter_jit
-def _evaluate(unknowns: Unknowns, spans: Spans) -> Flow:
-    return unknowns.representation.fields().on_grid(spans)
-
-
-def solution_of(
-    unknowns: Unknowns,
-    frame: Frame,
-    shape: tuple[int, int, int],
-    outcome: Outcome,
-    solver_s: float,
-    history: list[dict[str, float]],
-) -> Solution:
-    """The fields on a vertex grid, in SI units."""
-    spans = frame.vertices(shape)
-    temperature, pressure, velocity = frame.scales.to_si(_evaluate(unknowns, spans))
-    x, y, z = (
-        low + frame.scales.length_m * positions(span)
-        for low, span in zip(frame.room.lower_m, spans, strict=True)
-    )
-    return Solution(
-        x_m=x,
-        y_m=y,
-        z_m=z,
-        temperature_k=np.asarray(temperature),
-        pressure_m2_s2=np.asarray(pressure),
-        velocity_m_s=np.asarray(velocity),
-        outcome=outcome,
-        solver_s=solver_s,
-        history=tuple(history),
-    )

@@ -105,7 +105,8 @@ def run(
     tell({"kind": "start", "step": int(state.step), "memory_bytes": memory, "compile_s": compile_s})
     if settings.memory_limit_bytes is not None and memory > settings.memory_limit_bytes:
         raise SettingError(
-            f"A step needs {memory / 1e9:.2f} GB; only {settings.memory_limit_bytes / 1e9:.2f} GB may be used. "
+            f"A step needs {memory / 1e9:.2f} GB, and "
+            f"{settings.memory_limit_bytes / 1e9:.2f} GB may be used. "
             "Take smaller batches or a smaller network."
         )
     keeper = _Keeper(store, settings, configuration)

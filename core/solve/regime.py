@@ -6,7 +6,7 @@ import numpy as np
 
 from core.boundary import boundary_loss, point_losses
 from core.losses import Loss, PhysicsLoss, PriorLoss
-from core.problem import Problem
+from core.problem import Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.setting import SettingError, setting
 from core.shift_loss import ShiftLoss, displacement_rows, similarity_basis
@@ -85,15 +85,18 @@ def image_loss(
             shift.information_per_px2[used],
             shift.window_px,
         )
-        operator = build(problem.scene, view, kept.centres_px, shape)
+        operator = build(problem.scene, view, kept.centres_px, shape, window_px=float(kept.window_px))
         basis = similarity_basis(kept.centres_px, (camera.width_px, camera.height_px))
         views.append(displacement_rows(kept, operator, basis, model_std_px))
     return ShiftLoss(tuple(views), frame.vertices(shape), frame.scales, problem.scene.air, weight)
 
 
-def _usable(shift, data: DataModel) -> tuple[np.ndarray, float]:
+def _usable(shift: ShiftMeasurement, data: DataModel) -> tuple[np.ndarray, float]:
     """Windows to keep, and the representation error in px."""
     size = np.linalg.norm(shift.displacement_px, axis=1)
     noise = np.sqrt(np.trace(np.linalg.inv(shift.information_per_px2), axis1=1, axis2=2))
-    typical = float(np.sqrt(np.mean(np.minimum(size, np.percentile(size, 90)) ** 2)))
-    return (noise < 1.0) & (size < data.outlier * typical + 6 * noise), data.representation * typical
+    # Windows without texture first: beside the wall they draw shifts of hundreds of pixels.
+    textured = noise < 1.0
+    seen = size[textured]
+    typical = float(np.sqrt(np.mean(np.minimum(seen, np.percentile(seen, 90)) ** 2)))
+    return textured & (size < data.outlier * typical + 6 * noise), data.representation * typical

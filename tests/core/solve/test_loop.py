@@ -101,7 +101,7 @@ def test_a_torn_checkpoint_gives_way_to_the_one_before():
 def test_a_checkpoint_of_another_configuration_is_refused():
     store = Memory()
     solve(LoopSettings(steps=10, checkpoint_every_steps=5), store=store)
-    with pytest.raises(SettingError, match="another|changed"):
+    with pytest.raises(SettingError, match="were changed"):
         solve(LoopSettings(steps=10), store=store, configuration="b")
 
 
@@ -157,7 +157,8 @@ class Folder:
 
 folder = Path(sys.argv[1])
 slow = lambda event: time.sleep(0.01 if event["kind"] == "progress" else 0)
-found = solve(LoopSettings(steps=400, record_every=1, checkpoint_every_steps=20), store=Folder(folder), on_event=slow)
+settings = LoopSettings(steps=400, record_every=1, checkpoint_every_steps=20)
+found = solve(settings, store=Folder(folder), on_event=slow)
 np.save(folder / "end.npy", np.stack([found.last, found.best]))
 """
 
@@ -180,5 +181,3 @@ def test_kill_9_in_the_middle_and_again_ends_bitwise_the_same(tmp_path):
 
     whole = solve(LoopSettings(steps=400, record_every=1))
     np.testing.assert_array_equal(np.load(tmp_path / "end.npy"), np.stack([whole.last, whole.best]))
-
-
