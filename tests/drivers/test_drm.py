@@ -21,12 +21,14 @@ def test_what_is_no_card_is_refused_and_freed(tmp_path):
 
 
 @pytest.mark.hardware
-def test_a_real_card_shows_or_says_who_has_it():
+def test_a_real_card_is_a_display():
     card = Path("/dev/dri/card0")
     if not card.exists():
         pytest.skip("no graphics card here")
     try:
-        with DrmDisplay(card) as display:
-            assert isinstance(display, PatternDisplay)
-    except (DeviceBusyError, DeviceNotFoundError) as error:
-        assert "Use" in str(error) or "Plug" in str(error) or "Name" in str(error)
+        display = DrmDisplay(card)
+    except DeviceBusyError as error:
+        pytest.skip(str(error))
+    with display:
+        assert isinstance(display, PatternDisplay)
+        assert min(display.size) > 0
