@@ -92,16 +92,18 @@ def compute(folder: JobFolder, owner: Owner, stop: threading.Event) -> None:
     order = folder.order()
     kind = kinds.load(order["kind"])
     settings = kind.read(order["settings"])
-    output = folder.staging(owner.attempt)
+    staging = folder.staging(owner.attempt)
+    # The name that it will have: a report may show it.
+    output = staging / folder.target().name
     inherit_checkpoint(folder, owner.attempt)
-    shutil.rmtree(output, ignore_errors=True)
+    shutil.rmtree(staging, ignore_errors=True)
     make_folder(output)
     experiment = Path(order["experiment"]) if order["experiment"] else None
     task = Task(folder=folder, owner=owner, experiment=experiment, output=output, stop=stop)
     try:
         publish(task, kind.run(task, settings))
     finally:
-        shutil.rmtree(output, ignore_errors=True)
+        shutil.rmtree(staging, ignore_errors=True)
 
 
 def _introduce(folder: JobFolder, owner: Owner) -> None:

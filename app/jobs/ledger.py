@@ -192,6 +192,7 @@ class Ledger:
         make_folder(folder / "attempts")
         names = ("id", "kind", "experiment", "title")
         content = {name: row[name] for name in names} | {"settings": json.loads(row["settings"])}
+        content["submitted_s"] = row["now_s"]
         write_json(folder / "job.json", content)
 
 

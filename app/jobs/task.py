@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from app.durable import make_folder, publish_folder, write_json
+from app.errors import BadInputError
 from app.jobs.folder import JobFolder, Owner
 
 
@@ -33,6 +34,12 @@ class Task:
     def checkpoints(self) -> Path:
         """The folder for checkpoints; it already holds those of the attempt before."""
         return self.folder.attempt(self.owner.attempt) / "checkpoint"
+
+    def experiment_folder(self) -> Path:
+        """Return the experiment's folder. Raises BadInputError when the job names none."""
+        if self.experiment is None:
+            raise BadInputError(f"Job {self.folder.path.name} names no experiment; submit it with one.")
+        return self.experiment
 
     def tell(self, kind: str, body: Mapping[str, Any]) -> None:
         """Append an event. Not flushed to disk: progress is told, not promised."""

@@ -1,8 +1,8 @@
-"""Kill supervisor and workers at random moments while jobs run; count what was lost, doubled or torn.
+"""Kill supervisor, workers and service at random while jobs run; count what was lost, doubled or torn.
 
-    python -m tests.benchmarks.chaos --kills 300 --jobs 20
+    python -m tests.benchmarks.chaos --kills 300 --jobs 20 [--web]
 
-Prints one JSON line. Every number after `kills` must be 0, and `equal` the number of jobs: each result is
+Prints one JSON line. `lost` to `unequal` must be 0, and `equal` the number of jobs: each result is
 compared bit by bit with a run of the same job that nobody disturbed.
 """
 
@@ -12,20 +12,25 @@ import contextlib
 import json
 import random
 import signal
+import socket
 import sqlite3
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+import httpx
 import psutil
 
 from app import worker
+from app.errors import AirlensError
 from app.jobs import JobSpec, JobState, Ledger
 from app.jobs.folder import JobFolder, Owner
 
+ROLES = ("supervisor", "worker", "web")
 CONFIG = """
 devices = ["cpu:0", "cpu:1"]
 max_losses = 100000
@@ -62,72 +67,95 @@ def files_of(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-class Supervised:
-    """The supervisor's process, started again whenever it is gone."""
+class Kept:
+    """A process that is started again whenever it is gone, as a service manager would."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._log = open(folder / "supervisor.log", "ab")
+    def __init__(self, command: list[str], log: Path) -> None:
+        self._command, self._log = command, open(log, "ab")
         self._child: subprocess.Popen[bytes] | None = None
 
     def pid(self) -> int:
         """Return the process id, after starting the process again if need be."""
         if self._child is None or self._child.poll() is not None:
-            command = [sys.executable, "-m", "app.jobs", str(self._folder)]
-            self._child = subprocess.Popen(command, stdout=self._log, stderr=self._log)
+            self._child = subprocess.Popen(self._command, stdout=self._log, stderr=self._log)
         return self._child.pid
 
     def end(self) -> None:
         """Stop it as an operator would."""
         if self._child is not None:
             self._child.terminate()
-            self._child.wait(20)
+            self._child.wait(30)
         self._log.close()
 
 
-def workers_of(folder: Path) -> dict[int, str]:
-    """Return the pid of every living worker below a folder, with its job."""
+def living(folder: Path) -> dict[int, tuple[str, str]]:
+    """Return the pid of every supervisor and worker below a folder, with its role and its job."""
     found = {}
     for process in psutil.process_iter():
-        with contextlib.suppress(psutil.NoSuchProcess):
+        with contextlib.suppress(psutil.NoSuchProcess, IndexError):
             command = process.cmdline()
-            mine = "app.worker" in command and process.status() != psutil.STATUS_ZOMBIE
-            place = Path(command[command.index("app.worker") + 1]) if mine else None
-            if place is not None and place.parent == folder:
-                found[process.pid] = place.name
+            role = next((name for name in ("app.worker", "app.jobs") if name in command), None)
+            if role is None or process.status() == psutil.STATUS_ZOMBIE:
+                continue
+            place = Path(command[command.index(role) + 1])
+            if role == "app.worker" and place.parent == folder:
+                found[process.pid] = ("worker", place.name)
+            elif role == "app.jobs" and place == folder:
+                found[process.pid] = ("supervisor", "")
     return found
 
 
+Submit = Callable[[str, JobSpec], str]
+
+
 def disturb(
-    ledger: Ledger, wanted: list[JobSpec], kills: int, pause_s: float, seed: int, limit_s: float
+    ledger: Ledger,
+    wanted: list[JobSpec],
+    kept: Kept,
+    submit: Submit,
+    *,
+    kills: int,
+    pause_s: float,
+    seed: int,
+    limit_s: float,
 ) -> tuple[collections.Counter, list[str], float]:
     """Submit the jobs one by one and kill at random until all are done; return counts and the ids."""
     chance = random.Random(seed)
     counts: collections.Counter = collections.Counter()
-    supervised = Supervised(ledger.folder)
     waiting, ids, start_s = list(enumerate(wanted)), [], time.monotonic()
     try:
         while time.monotonic() - start_s < limit_s:
-            for _ in range(min(2, len(waiting))):
-                n, spec = waiting.pop(0)
-                ids.append(ledger.submit(spec, key=f"job-{n}").id)
-            supervisor, living = supervised.pid(), workers_of(ledger.folder)
-            doubled = collections.Counter(living.values())
-            counts["workers_at_once"] = max([counts["workers_at_once"], len(living)])
-            counts["jobs_seen_with_two_workers"] += sum(count > 1 for count in doubled.values())
+            owner = kept.pid()
+            for n, spec in waiting[:2]:
+                with contextlib.suppress(AirlensError, httpx.HTTPError):
+                    ids.append(submit(f"chaos-job-{n}", spec))
+                    waiting.remove((n, spec))
+            alive = living(ledger.folder)
+            _observe(counts, alive)
             if not waiting and all(job.state is JobState.done for job in ledger.jobs()):
                 break
-            if sum(counts[name] for name in ("supervisor", "worker")) < kills:
+            if sum(counts[name] for name in ROLES) < kills:
                 time.sleep(chance.expovariate(1 / pause_s))
-                victim = chance.choice([*living, *living, supervisor])
-                with contextlib.suppress(psutil.NoSuchProcess):
-                    psutil.Process(victim).send_signal(signal.SIGKILL)
-                    counts["supervisor" if victim == supervisor else "worker"] += 1
+                _kill_one(chance, ({owner: ("web", "")} if owner not in alive else {}) | alive, counts)
             else:
                 time.sleep(0.2)
     finally:
-        supervised.end()
+        kept.end()
     return counts, ids, time.monotonic() - start_s
+
+
+def _observe(counts: collections.Counter, alive: dict[int, tuple[str, str]]) -> None:
+    jobs = collections.Counter(job for role, job in alive.values() if role == "worker")
+    counts["workers_at_once"] = max(counts["workers_at_once"], sum(jobs.values()))
+    counts["jobs_seen_with_two_workers"] += sum(count > 1 for count in jobs.values())
+
+
+def _kill_one(chance: random.Random, alive: dict[int, tuple[str, str]], counts: collections.Counter) -> None:
+    """Kill a process; a worker twice as likely as any other."""
+    victim = chance.choice([pid for pid, (role, _) in alive.items() for _ in range(1 + (role == "worker"))])
+    with contextlib.suppress(psutil.NoSuchProcess):
+        psutil.Process(victim).send_signal(signal.SIGKILL)
+        counts[alive[victim][0]] += 1
 
 
 def judge(ledger: Ledger, ids: list[str], expected: list[dict[str, bytes]]) -> dict[str, int]:
@@ -166,17 +194,50 @@ def _all_events(ledger: Ledger):
 
 
 def chaos(
-    folder: Path, *, jobs: int, kills: int, trials: int, pause_s: float, seed: int, limit_s: float
+    folder: Path,
+    *,
+    jobs: int,
+    kills: int,
+    trials: int,
+    pause_s: float,
+    seed: int,
+    limit_s: float,
+    web: bool = False,
 ) -> dict:
     """Run the whole story; return the counts."""
     wanted = specs(jobs, trials)
     expected = undisturbed(folder / "undisturbed", wanted)
     ledger = Ledger(folder / "jobs")
     (ledger.folder / "jobs.toml").write_text(CONFIG)
-    counts, ids, wall_s = disturb(ledger, wanted, kills, pause_s, seed, limit_s)
-    killed = counts.pop("supervisor", 0), counts.pop("worker", 0)
-    record = {"jobs": len(ids), "kills": sum(killed), "supervisor": killed[0], "workers": killed[1]}
+    kept, submit = by_service(folder) if web else by_ledger(ledger)
+    chaotic = {"kills": kills, "pause_s": pause_s, "seed": seed, "limit_s": limit_s}
+    counts, ids, wall_s = disturb(ledger, wanted, kept, submit, **chaotic)
+    killed = {role: counts.pop(role, 0) for role in ROLES}
+    record = {"jobs": len(ids), "kills": sum(killed.values()), **killed}
     return record | judge(ledger, ids, expected) | counts | {"wall_s": round(wall_s, 1)}
+
+
+def by_ledger(ledger: Ledger) -> tuple[Kept, Submit]:
+    """Submit to the ledger itself; the supervisor is what is kept alive."""
+    kept = Kept([sys.executable, "-m", "app.jobs", str(ledger.folder)], ledger.folder / "supervisor.log")
+    return kept, lambda key, spec: ledger.submit(spec, key=key).id
+
+
+def by_service(folder: Path) -> tuple[Kept, Submit]:
+    """Submit over HTTP to `airlens serve`, which is what is kept alive; it attends to the supervisor."""
+    from app.client import Client
+
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    program = [sys.executable, "-c", "from app.cli import main; main()"]
+    kept = Kept([*program, "serve", str(folder), "--port", str(port)], folder / "serve.log")
+
+    def submit(key: str, spec: JobSpec) -> str:
+        token = (folder / "service" / "token").read_text().strip()
+        with Client(f"http://127.0.0.1:{port}", token, timeout_s=10.0) as client:
+            return client.submit_job(spec.kind, dict(spec.settings), key=key).job
+
+    return kept, submit
 
 
 def main() -> None:
@@ -188,6 +249,7 @@ def main() -> None:
     parser.add_argument("--pause-s", type=float, default=2.0, help="mean pause between kills")
     parser.add_argument("--limit-s", type=float, default=1800.0)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--web", action="store_true", help="submit to airlens serve, and kill that too")
     options = vars(parser.parse_args())
     with tempfile.TemporaryDirectory() as folder:
         print(json.dumps(chaos(Path(folder).resolve(), **options)))

@@ -52,6 +52,7 @@ def test_a_node_killed_in_the_middle_costs_less_than_45_s(tmp_path: Path, config
             ["squeue", "--noheader", "--format=%N"], capture_output=True, text=True, check=True
         )
         worker.kill()
+        worker.wait(10)
         if step is not None:
             step.kill()
         subprocess.run([SCRIPT, "kill", SLURM, daemon.stdout.split()[0]], check=True)

@@ -48,6 +48,8 @@ class Running:
 def ledger(tmp_path: Path) -> Iterator[Ledger]:
     ledger = Ledger(tmp_path / "jobs")
     yield ledger
+    for folder in ledger.folder.glob("j*/owner.json"):
+        JobFolder(folder.parent).revoke()  # ends also a worker that is only just starting
     for file in ledger.folder.glob("*/attempts/*/worker.json"):
         if is_held(file.with_name("worker.lock")):
             os.kill(json.loads(file.read_text())["pid"], signal.SIGKILL)
