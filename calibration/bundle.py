@@ -58,6 +58,7 @@ class Quality:
 class CalibratedOptics:
     """A camera or projector in the world. `covariance` is in the order of `OPTICS_PARAMETERS`; none = exact.
 
+    The projector's `cross_covariance` is with the first camera: their poses err together.
     Rotation rows are small rotations about the optics' own axes (left multiplied to
     `optics_from_world`), not increments of the Rodrigues vector.
     """
@@ -65,20 +66,25 @@ class CalibratedOptics:
     name: str
     optics: Optics
     covariance: Rows | None = None
+    cross_covariance: Rows | None = None
     quality: Quality = Quality()
 
     def __post_init__(self) -> None:
         size = len(OPTICS_PARAMETERS)
-        if self.covariance is not None and [len(row) for row in self.covariance] != [size] * size:
-            raise BundleError(
-                f"The covariance of {self.name!r} is not {size} x {size}; "
-                "expected one row and column for each optics parameter. Calibrate again."
-            )
+        for matrix in (self.covariance, self.cross_covariance):
+            if matrix is not None and [len(row) for row in matrix] != [size] * size:
+                raise BundleError(
+                    f"The covariance of {self.name!r} is not {size} x {size}; "
+                    "expected one row and column for each optics parameter. Calibrate again."
+                )
 
     def covariance_matrix(self) -> Float[np.ndarray, "15 15"]:
         """The covariance as an array; zeros where the optics are exact."""
-        size = len(OPTICS_PARAMETERS)
-        return np.zeros((size, size)) if self.covariance is None else np.array(self.covariance, float)
+        return _matrix(self.covariance)
+
+    def cross_covariance_matrix(self) -> Float[np.ndarray, "15 15"]:
+        """Covariance of these optics (rows) with the first camera (columns); zeros where unknown."""
+        return _matrix(self.cross_covariance)
 
 
 @dataclass(frozen=True)
@@ -254,6 +260,11 @@ def from_json(text: str, source: str = "bundle.json") -> Bundle:
             f"{source} is not JSON ({error}). Restore it from its copy, or calibrate again."
         ) from error
     return strict.decode(Bundle, content, source)
+
+
+def _matrix(rows: Rows | None) -> Float[np.ndarray, "15 15"]:
+    size = len(OPTICS_PARAMETERS)
+    return np.zeros((size, size)) if rows is None else np.array(rows, float)
 
 
 def _put(items: tuple[Any, ...], new: Any) -> tuple[Any, ...]:

@@ -40,18 +40,28 @@ class Residuals(eqx.Module):
 
 @setting
 class Numbers:
-    """Reynolds, Péclet, Richardson; gravity acts along -z."""
+    """Reynolds, Péclet, Richardson; gravity acts along -z. The first two are arrays where learned."""
 
-    reynolds: float
-    peclet: float
+    reynolds: float | Float[Array, ""]
+    peclet: float | Float[Array, ""]
     richardson: float
 
     def __post_init__(self) -> None:
+        if not (isinstance(self.reynolds, float | int) and isinstance(self.peclet, float | int)):
+            return  # traced: made from numbers that were checked
         if not (0 < self.reynolds < math.inf and 0 < self.peclet < math.inf):
             raise SettingError(
                 f"Re is {self.reynolds:g} and Pe is {self.peclet:g}; expected finite positive numbers. "
                 "Give viscosity and diffusivity in m2/s (room air with turbulence: about 1e-3)."
             )
+
+    def with_transport(self, viscosity: Float[Array, ""], diffusivity: Float[Array, ""]) -> "Numbers":
+        """The numbers of a flow whose viscosity and diffusivity are these factors larger."""
+        return Numbers(
+            reynolds=self.reynolds / viscosity,
+            peclet=self.peclet / diffusivity,
+            richardson=self.richardson,
+        )
 
 
 def residuals(value: Flow, grad: Flow, laplacian: Flow, numbers: Numbers) -> Residuals:

@@ -25,6 +25,19 @@ class ShiftMeasurement(eqx.Module):
     window_px: int = eqx.field(static=True)
 
 
+class ImagePair(eqx.Module):
+    """Both images of one view, and the variance of a pixel of their difference (images' unit squared).
+
+    `sample_offsets_px`, if given, are the sensor positions (column, row) about the pixel's centre at
+    which both images were rendered: they belong to a simulation and are shared with its model.
+    """
+
+    reference_image: Float[np.ndarray, "rows cols"]
+    flow_image: Float[np.ndarray, "rows cols"]
+    difference_variance: float
+    sample_offsets_px: Float[np.ndarray, "rows cols samples 2"] | None = None
+
+
 class PlaneData(eqx.Module):
     """T, p, u on a wall's plane, at vertices along the two other axes (order x, y, z)."""
 
@@ -53,3 +66,4 @@ class Problem(eqx.Module):
     shifts: tuple[ShiftMeasurement, ...]
     planes: tuple[PlaneData, ...] = ()
     sensors: tuple[SensorData, ...] = ()
+    images: tuple[ImagePair, ...] = ()

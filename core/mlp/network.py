@@ -9,8 +9,9 @@ import jax.numpy as jnp
 from jax.typing import DTypeLike
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from core.boussinesq import Flow
+from core.boussinesq import Flow, Numbers, Residuals, residuals
 from core.mlp.propagation import Activation, activate, propagate_activation, propagate_linear
+from core.representation import Spans, points_of
 from core.setting import SettingError, setting
 
 Corner = tuple[float, float, float]
@@ -70,6 +71,24 @@ class Mlp(eqx.Module):
             Flow(gradient[:, 0], gradient[:, 1], gradient[:, 2:]),
             _split(stack[4]),
         )
+
+    def fields(self) -> "Mlp":
+        """Itself: there is nothing to share between losses."""
+        return self
+
+    def on_grid(self, spans: Spans) -> Flow:
+        """T, p, u on a tensor grid of points."""
+        shape = tuple(span[2] for span in spans)
+        found = self.at(jnp.asarray(points_of(spans), self.biases[0].dtype))
+        return jax.tree.map(lambda a: a.reshape(*shape, *a.shape[1:]), found)
+
+    def residuals(self, numbers: Numbers, points_nd: Float[Array, "points 3"] | None) -> Residuals:
+        """The continuous residuals at the points, which a network always needs."""
+        if points_nd is None:
+            raise SettingError(
+                "A network has no cells of its own: give collocation points for its residuals."
+            )
+        return jax.vmap(residuals, (0, 0, 0, None))(*self.with_derivatives(points_nd), numbers)
 
     def _normalised(self, points_nd: Float[Array, "points 3"]) -> Float[Array, "points 3"]:
         lower, upper = (jnp.array(corner, points_nd.dtype)[None, :] for corner in (self.lower, self.upper))

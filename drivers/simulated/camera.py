@@ -15,10 +15,10 @@ from drivers.clock import Clock
 from drivers.errors import DeviceNotFoundError, DeviceSettingError, DeviceTimeoutError
 from drivers.gate import Arrival, FrameGate
 from drivers.protocols import CameraInfo, Frame, Pixels
+from drivers.shift import shift_image
 from drivers.simulated.clock import VirtualClock
 from drivers.simulated.faults import CameraFault, FaultScript, no_faults
 from drivers.simulated.sensor import ExpectedCounts, Luminance, SensorNoise
-from drivers.simulated.shift import shift_image
 
 TIMEOUT_S = 2.0
 BUFFERS = 4

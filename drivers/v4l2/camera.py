@@ -13,8 +13,9 @@ from drivers.gate import Arrival, FrameGate
 from drivers.protocols import CameraInfo, Frame
 from drivers.v4l2 import abi
 from drivers.v4l2.controls import Controls
-from drivers.v4l2.formats import Geometry, pixel_format
+from drivers.v4l2.formats import pixel_format
 from drivers.v4l2.inventory import captures, list_devices, query
+from drivers.v4l2.negotiation import negotiate_format, negotiate_period_s
 from drivers.v4l2.node import Node
 from drivers.v4l2.stream import Filled, Stream
 
@@ -156,8 +157,11 @@ class V4l2Camera:
             if not captures(about) or expected not in (None, (about.card, about.bus_info)):
                 raise DeviceNotFoundError(f"{path} is not the camera that was asked for.")
             self._identity = about.card, about.bus_info
-            self._geometry = self._negotiate(self._node)
-            self._period_s = self._negotiate_rate(self._node)
+            wanted = self._request
+            self._geometry = negotiate_format(
+                self._node, wanted.pixel_format, wanted.width_px, wanted.height_px
+            )
+            self._period_s = negotiate_period_s(self._node, wanted.frame_rate_hz)
             self._controls = Controls(self._node)
             self._apply_settings()
             self._bits = self._request.bits or self._format.bits
@@ -166,40 +170,6 @@ class V4l2Camera:
         except BaseException:
             self.close()
             raise
-
-    def _negotiate(self, node: Node) -> Geometry:
-        wanted = self._request
-        ask = abi.Format(type=abi.BUF_TYPE_VIDEO_CAPTURE)
-        pix = ask.fmt.pix
-        pix.width, pix.height, pix.field = wanted.width_px, wanted.height_px, abi.FIELD_NONE
-        pix.pixelformat = abi.fourcc(wanted.pixel_format)
-        node.call(abi.VIDIOC_S_FMT, ask)
-        granted = f"{abi.fourcc_text(pix.pixelformat)} {pix.width} x {pix.height}"
-        asked = f"{wanted.pixel_format} {wanted.width_px} x {wanted.height_px}"
-        if granted != asked or pix.field != abi.FIELD_NONE:
-            raise DeviceSettingError(
-                f"{node.path} would give {granted} (field order {pix.field}) instead of {asked}. "
-                "Ask for a format and size that `airlens devices` lists."
-            )
-        return Geometry(pix.height, pix.width, pix.bytesperline)
-
-    def _negotiate_rate(self, node: Node) -> float:
-        parameters = abi.StreamParm(type=abi.BUF_TYPE_VIDEO_CAPTURE)
-        wanted_hz = self._request.frame_rate_hz
-        if wanted_hz is not None:
-            parameters.timeperframe = abi.Fract(1000, round(1000 * wanted_hz))
-            node.call(abi.VIDIOC_S_PARM, parameters)
-        node.call(abi.VIDIOC_G_PARM, parameters)
-        period = parameters.timeperframe
-        if not period.numerator or not period.denominator:
-            return 1 / (wanted_hz or 30.0)  # the driver does not say; only used for time limits
-        granted_hz = period.denominator / period.numerator
-        if wanted_hz is not None and abs(granted_hz - wanted_hz) > 0.01 * wanted_hz:
-            raise DeviceSettingError(
-                f"{node.path} would run at {granted_hz:g} Hz instead of {wanted_hz:g} Hz. "
-                "Ask for a rate that `airlens devices` lists for this size."
-            )
-        return 1 / granted_hz
 
     def _apply_settings(self) -> None:
         if self._request.automatics_off:

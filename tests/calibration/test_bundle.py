@@ -34,7 +34,11 @@ def test_a_bundle_survives_text_exactly():
     covariance = tuple(tuple(0.1 * i * j for j in range(15)) for i in range(15))
     bundle = bundle.with_camera(
         CalibratedOptics(
-            "camera", bundle.camera().optics, covariance, Quality("measured", 0.1, 9, 0.8, ("Retake 3.",))
+            "camera",
+            bundle.camera().optics,
+            covariance,
+            None,
+            Quality("measured", 0.1, 9, 0.8, ("Retake 3.",)),
         )
     )
 

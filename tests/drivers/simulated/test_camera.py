@@ -3,8 +3,8 @@ import pytest
 
 from drivers.errors import DeviceNotFoundError, DeviceTimeoutError, FrameError, FrameFault
 from drivers.protocols import Camera
+from drivers.shift import shift_image
 from drivers.simulated import CameraFault, SensorNoise, SimulatedCamera, VirtualClock
-from drivers.simulated.shift import shift_image
 from tests.drivers.scenes import pattern
 
 

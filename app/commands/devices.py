@@ -1,0 +1,44 @@
+"""`airlens devices`: what is plugged in, and what each can do."""
+
+import json
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import typer
+
+
+def register(cli: typer.Typer) -> None:
+    """Add `devices`."""
+    cli.command()(devices)
+
+
+def devices(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="List sizes, rates and controls too.")] = False,
+) -> None:
+    """List cameras with their formats and controls, serial ports, and screens."""
+    from serial.tools import list_ports
+
+    from drivers.v4l2 import list_devices
+
+    cameras = list_devices()
+    ports = [{"device": port.device, "description": port.description} for port in list_ports.comports()]
+    if as_json:
+        found: list[dict[str, Any]] = [asdict(camera) for camera in cameras]
+        typer.echo(json.dumps({"cameras": found, "serial_ports": ports}, default=str))
+        return
+    for camera in cameras:
+        typer.echo(f"{camera.path}  {camera.name}" + (f"  {camera.error}" if camera.error else ""))
+        for item in camera.formats:
+            sizes = [f"{s.width_px}x{s.height_px}@{max(s.rates_hz, default=0):g}" for s in item.sizes]
+            shown = ", ".join(sizes if full else sizes[-3:])
+            typer.echo(f"    {item.code:<5}{item.description:<24}{shown}")
+        for control in camera.controls if full else ():
+            typer.echo(f"    {control.name} {control.minimum}..{control.maximum} ({control.kind})")
+    for port in ports:
+        typer.echo(f"{port['device']}  serial port  {port['description']}")
+    if not cameras and not ports:
+        typer.echo(
+            "No camera and no serial port was found. Plug one in; on Linux a camera is /dev/video*. "
+            "A simulated rig needs none: airlens demo."
+        )

@@ -1,0 +1,76 @@
+"""A scene without dimensions: its scales, its numbers, its box."""
+
+from typing import NamedTuple
+
+from core.boussinesq import Numbers, Scales, scales
+from core.geometry import Box
+from core.problem import Problem
+from core.representation import Spans
+from core.scene import FlowModel, Heater, Inlet, Wall
+from core.setting import SettingError
+
+# ν_eff = U L / Re of the mean flow where nothing is given. Two RANS rooms (warm jets, 0.3 and 0.5 m/s,
+# volume-mean ν + ν_t) have 1490 and 1790 for momentum and 1260 and 1520 for heat.
+_EFFECTIVE_REYNOLDS = 1600.0
+_EFFECTIVE_PECLET = 1400.0
+
+
+class Frame(NamedTuple):
+    """Nondimensional coordinates are (x − lower corner) / length."""
+
+    room: Box
+    scales: Scales
+    numbers: Numbers
+    upper: tuple[float, float, float]
+    lower: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def vertices(self, shape: tuple[int, int, int]) -> Spans:
+        """The vertex grid of the room with this shape."""
+        x, y, z = ((low, up, n) for low, up, n in zip(self.lower, self.upper, shape, strict=True))
+        return x, y, z
+
+
+def frame_of(problem: Problem) -> Frame:
+    """Scales from the largest known speed and excess temperature; length is the room's height."""
+    scene = problem.scene
+    ambient = scene.air.ambient_temperature_k
+    excess, speeds = [0.0], [0.0]
+    for item in scene.boundary:
+        match item:
+            case Inlet():
+                excess.append(item.temperature_k - ambient)
+                speeds.append(sum(v * v for v in item.velocity_m_s) ** 0.5)
+            case Heater():
+                excess.append(item.temperature_k - ambient)
+            case Wall(temperature_k=float() as kelvin):
+                excess.append(kelvin - ambient)
+            case _:
+                pass
+    for plane in problem.planes:
+        departure = plane.temperature_k - ambient
+        excess.append(float(departure.flat[abs(departure).argmax()]))
+        speeds.append(float((plane.velocity_m_s**2).sum(-1).max() ** 0.5))
+    room = scene.room
+    found = scales(
+        length_m=room.size_m[2], speed_m_s=max(speeds), excess_k=max(excess, key=abs), air=scene.air
+    )
+    x, y, z = (size / found.length_m for size in room.size_m)
+    return Frame(room, found, _numbers(scene.flow, problem, found), (x, y, z))
+
+
+def _numbers(flow: FlowModel, problem: Problem, found: Scales) -> Numbers:
+    air, convection = problem.scene.air, found.velocity_m_s * found.length_m
+    match flow.transport:
+        case "molecular":
+            viscosity = air.kinematic_viscosity_m2_s
+            diffusivity = viscosity / air.prandtl
+        case "given":
+            if flow.viscosity_m2_s is None or flow.diffusivity_m2_s is None:
+                raise SettingError(
+                    f"Flow transport is 'given', with viscosity_m2_s {flow.viscosity_m2_s} and "
+                    f"diffusivity_m2_s {flow.diffusivity_m2_s}; give both, or take transport = 'auto'."
+                )
+            viscosity, diffusivity = flow.viscosity_m2_s, flow.diffusivity_m2_s
+        case _:
+            viscosity, diffusivity = convection / _EFFECTIVE_REYNOLDS, convection / _EFFECTIVE_PECLET
+    return found.numbers(viscosity_m2_s=viscosity, diffusivity_m2_s=diffusivity, air=air)

@@ -1,0 +1,63 @@
+"""From unknowns to a `Solution`: the fields on the room's vertices, in SI units."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import numpy as np
+
+from core.boussinesq import Flow
+from core.representation import Spans, Unknowns, positions
+from core.result import Outcome, Solution
+from core.solve.frame import Frame
+
+
+def solution_of(
+    unknowns: Unknowns,
+    frame: Frame,
+    shape: tuple[int, int, int],
+    outcome: Outcome,
+    solver_s: float,
+    history: Sequence[dict[str, float]],
+    notes: tuple[str, ...] = (),
+) -> Solution:
+    """Evaluate on a vertex grid of `shape`."""
+    spans = frame.vertices(shape)
+    temperature, pressure, velocity = frame.scales.to_si(_evaluate(unknowns, spans))
+    x, y, z = (
+        low + frame.scales.length_m * positions(span)
+        for low, span in zip(frame.room.lower_m, spans, strict=True)
+    )
+    return Solution(
+        x_m=x,
+        y_m=y,
+        z_m=z,
+        temperature_k=np.asarray(temperature),
+        pressure_m2_s2=np.asarray(pressure),
+        velocity_m_s=np.asarray(velocity),
+        outcome=outcome,
+        solver_s=solver_s,
+        history=tuple(history),
+        notes=(*notes, *_learned(unknowns, frame)),
+    )
+
+
+@eqx.filter_jit
+def _evaluate(unknowns: Unknowns, spans: Spans) -> Flow:
+    return unknowns.representation.fields().on_grid(spans)
+
+
+def _learned(unknowns: Unknowns, frame: Frame) -> tuple[str, ...]:
+    """Re, Pe and the drift that were used or found."""
+    numbers, notes = frame.numbers, []
+    if unknowns.log_transport is not None:
+        viscosity, diffusivity = (float(f) for f in np.exp(np.asarray(unknowns.log_transport)))
+        notes.append(
+            f"Learned transport: Re {numbers.reynolds / viscosity:.4g}, "
+            f"Pe {numbers.peclet / diffusivity:.4g}."
+        )
+    else:
+        notes.append(f"Transport as given: Re {numbers.reynolds:.4g}, Pe {numbers.peclet:.4g}.")
+    if unknowns.drift_px is not None:
+        drift = ", ".join(f"{v:.2g}" for v in np.asarray(unknowns.drift_px).ravel())
+        notes.append(f"Drift solved along (columns, rows, rotation, magnification): {drift} px.")
+    return tuple(notes)

@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+
+from calibration.board import CharucoBoard, Chessboard, CircleGrid
+from calibration.errors import CalibrationError
+from calibration.rehearsal import look
+from calibration.views import view_of
+from tests.calibration.practice import exposed, project, rig, standing
+
+# Board point 0 is this many squares from the corner of the print.
+BOARDS = (
+    (Chessboard(9, 6, 0.08), 2.0),
+    (CharucoBoard(9, 7, 0.08, 0.056), 1.0),
+    (CircleGrid(8, 6, 0.09), 2.0),
+    (CircleGrid(4, 9, 0.14, asymmetric=True), 2.0),
+)
+
+
+@pytest.mark.parametrize(("board", "margin"), BOARDS, ids=["chessboard", "charuco", "circles", "asymmetric"])
+def test_board_points_are_found_where_they_are(board, margin):
+    camera, _ = rig(0.5)
+    sheet = standing(board, (0.05, 2.3, 1.2), (15, -20, 8))
+    picture = exposed(look(camera, (sheet,), samples=1).expose(ambient=0.9), np.random.default_rng(1))
+
+    view = view_of("view", picture, board, full_scale=1023)
+
+    assert view.detection is not None
+    assert view.issues == ()
+    step_m = getattr(board, "spacing_m", None) or board.square_m
+    on_sheet = view.points_m[:, :2] + margin * step_m
+    truth = project(camera, sheet.position_m + on_sheet @ sheet.world_from_sheet[:, :2].T)
+    # A board may be numbered from its other end; the set of points is what counts.
+    error = np.linalg.norm(view.detection.pixels_px[:, None] - truth[None], axis=2).min(axis=1)
+    # Corners: 0.1 px at 10-bit noise in half-size pictures; circles: their ellipse's centre is biased.
+    assert np.sqrt(np.mean(error**2)) < (0.25 if isinstance(board, CircleGrid) else 0.1)
+
+
+def test_a_board_that_is_not_there_a_saturated_and_a_blurred_one_are_named():
+    camera, _ = rig(0.5)
+    board = Chessboard(9, 6, 0.08)
+    luminance = look(camera, (standing(board, (0.0, 2.3, 1.2), (0, 10, 0)),), samples=1).expose(ambient=1.0)
+    rng = np.random.default_rng(2)
+
+    empty = view_of("empty", np.full((512, 640), 200, np.uint16), board, 1023)
+    bright = view_of("bright", exposed(luminance * 2.0, rng), board, 1023)
+    smeared = sum(np.roll(luminance, shift, axis=1) for shift in range(-6, 7)) / 13
+    moved = view_of("moved", exposed(smeared, rng), board, 1023)
+
+    assert not empty.usable
+    assert "not found" in empty.issues[0]
+    assert any("saturated" in issue and "shorter exposure" in issue for issue in bright.issues)
+    assert any("blur" in issue for issue in moved.issues) or not moved.usable
+
+
+def test_impossible_boards_are_refused():
+    with pytest.raises(CalibrationError, match=r"75 mm is 0\.075"):
+        Chessboard(9, 7, 75.0)
+    with pytest.raises(CalibrationError, match="smaller than squares"):
+        CharucoBoard(9, 7, 0.05, 0.06)
+    with pytest.raises(CalibrationError, match="Unknown marker dictionary"):
+        CharucoBoard(9, 7, 0.05, 0.04, "DICT_NONE")
