@@ -10,6 +10,7 @@ import argparse
 import collections
 import contextlib
 import json
+import multiprocessing
 import random
 import signal
 import socket
@@ -20,6 +21,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import httpx
@@ -80,6 +82,10 @@ class Kept:
             self._child = subprocess.Popen(self._command, stdout=self._log, stderr=self._log)
         return self._child.pid
 
+    def is_alive(self) -> bool:
+        """True while the process runs."""
+        return self._child is not None and self._child.poll() is None
+
     def end(self) -> None:
         """Stop it as an operator would."""
         if self._child is not None:
@@ -122,26 +128,29 @@ def disturb(
     """Submit the jobs one by one and kill at random until all are done; return counts and the ids."""
     chance = random.Random(seed)
     counts: collections.Counter = collections.Counter()
-    waiting, ids, start_s = list(enumerate(wanted)), [], time.monotonic()
+    waiting, start_s = list(enumerate(wanted)), time.monotonic()
+    ids: dict[int, str] = {}
     try:
         while time.monotonic() - start_s < limit_s:
             owner = kept.pid()
             for n, spec in waiting[:2]:
                 with contextlib.suppress(AirlensError, httpx.HTTPError):
-                    ids.append(submit(f"chaos-job-{n}", spec))
+                    ids[n] = submit(f"chaos-job-{n}", spec)
                     waiting.remove((n, spec))
-            alive = living(ledger.folder)
-            _observe(counts, alive)
+            _observe(counts, living(ledger.folder))
             if not waiting and all(job.state is JobState.done for job in ledger.jobs()):
                 break
             if sum(counts[name] for name in ROLES) < kills:
                 time.sleep(chance.expovariate(1 / pause_s))
-                _kill_one(chance, ({owner: ("web", "")} if owner not in alive else {}) | alive, counts)
+                alive = living(ledger.folder)  # looked up again: only what lives can be killed
+                if kept.is_alive() and owner not in alive:
+                    alive[owner] = ("web", "")
+                _kill_one(chance, alive, counts)
             else:
                 time.sleep(0.2)
     finally:
         kept.end()
-    return counts, ids, time.monotonic() - start_s
+    return counts, [ids[n] for n in sorted(ids)], time.monotonic() - start_s
 
 
 def _observe(counts: collections.Counter, alive: dict[int, tuple[str, str]]) -> None:
@@ -152,6 +161,8 @@ def _observe(counts: collections.Counter, alive: dict[int, tuple[str, str]]) -> 
 
 def _kill_one(chance: random.Random, alive: dict[int, tuple[str, str]], counts: collections.Counter) -> None:
     """Kill a process; a worker twice as likely as any other."""
+    if not alive:
+        return
     victim = chance.choice([pid for pid, (role, _) in alive.items() for _ in range(1 + (role == "worker"))])
     with contextlib.suppress(psutil.NoSuchProcess):
         psutil.Process(victim).send_signal(signal.SIGKILL)
@@ -206,12 +217,16 @@ def chaos(
 ) -> dict:
     """Run the whole story; return the counts."""
     wanted = specs(jobs, trials)
-    expected = undisturbed(folder / "undisturbed", wanted)
+    pool = ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))
+    halves = [pool.submit(undisturbed, folder / f"undisturbed{n}", wanted[n::2]) for n in range(2)]
     ledger = Ledger(folder / "jobs")
     (ledger.folder / "jobs.toml").write_text(CONFIG)
     kept, submit = by_service(folder) if web else by_ledger(ledger)
     chaotic = {"kills": kills, "pause_s": pause_s, "seed": seed, "limit_s": limit_s}
     counts, ids, wall_s = disturb(ledger, wanted, kept, submit, **chaotic)
+    even, odd = (half.result() for half in halves)
+    expected = [(odd if n % 2 else even)[n // 2] for n in range(jobs)]
+    pool.shutdown()
     killed = {role: counts.pop(role, 0) for role in ROLES}
     record = {"jobs": len(ids), "kills": sum(killed.values()), **killed}
     return record | judge(ledger, ids, expected) | counts | {"wall_s": round(wall_s, 1)}
