@@ -134,7 +134,7 @@ def disturb(
         while time.monotonic() - start_s < limit_s:
             owner = kept.pid()
             for n, spec in waiting[:2]:
-                with contextlib.suppress(AirlensError, httpx.HTTPError):
+                with contextlib.suppress(AirlensError, httpx.HTTPError, OSError):
                     ids[n] = submit(f"chaos-job-{n}", spec)
                     waiting.remove((n, spec))
             _observe(counts, living(ledger.folder))
