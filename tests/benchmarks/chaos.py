@@ -33,6 +33,7 @@ from app.jobs import JobSpec, JobState, Ledger
 from app.jobs.folder import JobFolder, Owner
 
 ROLES = ("supervisor", "worker", "web")
+UP_S = 30.0
 CONFIG = """
 devices = ["cpu:0", "cpu:1"]
 max_losses = 100000
@@ -75,12 +76,18 @@ class Kept:
     def __init__(self, command: list[str], log: Path) -> None:
         self._command, self._log = command, open(log, "ab")
         self._child: subprocess.Popen[bytes] | None = None
+        self._started_s = 0.0
 
     def pid(self) -> int:
         """Return the process id, after starting the process again if need be."""
         if self._child is None or self._child.poll() is not None:
+            self._started_s = time.monotonic()
             self._child = subprocess.Popen(self._command, stdout=self._log, stderr=self._log)
         return self._child.pid
+
+    def age_s(self) -> float:
+        """Seconds since the process was last started."""
+        return time.monotonic() - self._started_s
 
     def is_alive(self) -> bool:
         """True while the process runs."""
@@ -143,7 +150,8 @@ def disturb(
             if sum(counts[name] for name in ROLES) < kills:
                 time.sleep(chance.expovariate(1 / pause_s))
                 alive = living(ledger.folder)  # looked up again: only what lives can be killed
-                if kept.is_alive() and owner not in alive:
+                # A service that is killed before it is up would never take the jobs.
+                if owner not in alive and kept.is_alive() and (not waiting or kept.age_s() > UP_S):
                     alive[owner] = ("web", "")
                 _kill_one(chance, alive, counts)
             else:
