@@ -55,7 +55,7 @@ class Experiment:
         return self.folder / "results"
 
     def file(self, name: str) -> Path:
-        """A file that the settings name, inside the folder. Raises BadInputError for a path that leaves it."""
+        """A file that the settings name, inside the folder. Raises BadInputError for a path outside it."""
         path = (self.folder / name).resolve()
         if not path.is_relative_to(self.folder.resolve()):
             raise BadInputError(
@@ -77,7 +77,8 @@ class Experiment:
         found = self.captures(role)
         if not found:
             raise BadInputError(
-                f"{self.folder} has no finished {role} capture. Take one: airlens capture {role} {self.folder}"
+                f"{self.folder} has no finished {role} capture. "
+                f"Take one: airlens capture {role} {self.folder}"
             )
         return found[-1]
 

@@ -1,0 +1,119 @@
+"""From the `[rig]` table to open devices. The only module that knows the simulated twins."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float32
+
+from app.errors import BadInputError
+from app.experiment import Experiment
+from app.rig_settings import SimulatedCameraSettings
+from app.truth import RoomVolume, read_volume
+from core.fields import GridField
+from core.geometry import Box, Optics, rotation_matrix, rotation_vector
+from core.render import render_flow, render_reference
+from core.scene import Scene
+from drivers.protocols import Camera
+from drivers.simulated import SensorNoise, SimulatedCamera
+
+AirState = Literal["still", "moving"]
+
+
+def open_camera(experiment: Experiment, air: AirState, view: int = 0) -> Camera:
+    """Open the experiment's camera. `air` says what a simulated room does; a real room is as it is."""
+    settings = experiment.settings.rig.camera
+    if isinstance(settings, SimulatedCameraSettings):
+        return _simulated_camera(experiment, settings, air, view)
+    raise BadInputError(f"No driver for a camera of kind {settings.kind!r}; known: simulated.")
+
+
+def _simulated_camera(
+    experiment: Experiment, settings: SimulatedCameraSettings, air: AirState, view: int
+) -> SimulatedCamera:
+    scene = experiment.settings.scene
+    noise = scene.views[view].noise
+    sensor = SensorNoise(noise.full_well_e, noise.read_noise_e, noise.dark_counts, noise.bits)
+    if settings.noise_free:
+        # So many photons that shot noise is 1e-6, and the finest digits there are.
+        sensor = SensorNoise(1e12, 0.0, 64.0, 16)
+    if air == "moving":
+        scene = drifted(scene, view, settings.drift_px, settings.seed)
+    image = _memo(lambda: _render(experiment, settings, scene, air, view))
+    return SimulatedCamera(
+        image,
+        seed=2 * settings.seed + (air == "moving"),
+        noise=sensor,
+        exposure_s=settings.exposure_s,
+        name=f"simulated {scene.views[view].name}",
+    )
+
+
+def _render(
+    experiment: Experiment, settings: SimulatedCameraSettings, scene: Scene, air: AirState, view: int
+) -> Float32[np.ndarray, "rows cols"]:
+    if air == "still":
+        return render_reference(scene, view)
+    volume = read_volume(experiment.file(settings.room))
+    return render_flow(scene, volume_field(volume, scene), view)
+
+
+def volume_field(volume: RoomVolume, scene: Scene) -> GridField:
+    """The volume's excess refractivity on evenly spaced vertices."""
+    excess_k = _evenly_spaced(volume).astype(np.float64) - scene.air.ambient_temperature_k
+    excess = -scene.air.ambient_refractivity * excess_k / (scene.air.ambient_temperature_k + excess_k)
+    room: Box = scene.room
+    return GridField(room.lower_m, room.upper_m, excess.astype(np.float32))
+
+
+def drifted(scene: Scene, view: int, drift_px: float, seed: int) -> Scene:
+    """The scene with one camera moved between exposures: a shift of `drift_px` and a roll as large at the edge."""
+    if drift_px == 0.0:
+        return scene
+    rng = np.random.default_rng([seed, 77])
+    camera = scene.views[view].camera
+    angle = rng.uniform(0, 2 * np.pi)
+    roll = rng.choice([-1.0, 1.0]) * drift_px / camera.width_px
+    moved = _moved(camera, drift_px * np.cos(angle), drift_px * np.sin(angle), roll)
+    views = list(scene.views)
+    views[view] = replace(views[view], camera=moved)
+    return replace(scene, views=tuple(views))
+
+
+def _moved(camera: Optics, column_px: float, row_px: float, roll_rad: float) -> Optics:
+    cx, cy = camera.principal_px
+    rotation = rotation_matrix((0.0, 0.0, float(roll_rad))) @ camera.rotation
+    return replace(
+        camera,
+        principal_px=(float(cx + column_px), float(cy + row_px)),
+        rotation_rad=rotation_vector(rotation),
+    )
+
+
+def _evenly_spaced(volume: RoomVolume) -> Float32[np.ndarray, "nx ny nz"]:
+    """Temperature on evenly spaced vertices, at least as fine as the volume's own."""
+    temperature = volume.temperature_k
+    for index, axis in enumerate((volume.x_m, volume.y_m, volume.z_m)):
+        steps = np.diff(axis)
+        if steps.max() - steps.min() > 1e-4 * steps.max():
+            count = int(np.ceil((axis[-1] - axis[0]) / steps.min())) + 1
+            even = np.linspace(axis[0], axis[-1], min(count, 512))
+            temperature = np.apply_along_axis(
+                lambda line, even=even, axis=axis: np.interp(even, axis, line), index, temperature
+            )
+    return temperature.astype(np.float32)
+
+
+def _memo(
+    make: Callable[[], Float32[np.ndarray, "rows cols"]],
+) -> Callable[[], Float32[np.ndarray, "rows cols"]]:
+    """The same array at every call: the twin then draws from it without preparing it again."""
+    made: list[Float32[np.ndarray, "rows cols"]] = []
+
+    def view() -> Float32[np.ndarray, "rows cols"]:
+        if not made:
+            made.append(make())
+        return made[0]
+
+    return view

@@ -1,0 +1,113 @@
+"""Room volumes: the NPZ format of an airflow ground truth (T, p, u on a vertex grid), read strictly.
+
+Arrays are indexed [ix, iy, iz] at vertices x, y, z [m], end planes included. T in K, kinematic p in m2/s2,
+u in m/s with the last axis x, y, z. `meta_json` may describe the case: domain, inlets, outlet, heater, walls.
+"""
+
+import json
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from app.errors import BadInputError
+
+_LARGEST_BYTES = 2 << 30
+_REQUIRED = ("x", "y", "z", "T", "p", "u", "T0")
+
+
+@dataclass(frozen=True)
+class RoomVolume:
+    """Temperature, pressure and velocity of a room, and what is known of how it was made."""
+
+    x_m: Float[np.ndarray, " nx"]
+    y_m: Float[np.ndarray, " ny"]
+    z_m: Float[np.ndarray, " nz"]
+    temperature_k: Float[np.ndarray, "nx ny nz"]
+    pressure_m2_s2: Float[np.ndarray, "nx ny nz"]
+    velocity_m_s: Float[np.ndarray, "nx ny nz 3"]
+    ambient_k: float
+    density_kg_m3: float = 1.2041
+    gladstone_dale_m3_kg: float = 2.26e-4
+    case: dict[str, Any] = field(default_factory=dict)
+    scalars: dict[str, Any] = field(default_factory=dict)
+
+
+def read_volume(path: Path) -> RoomVolume:
+    """Read and check a volume. Raises BadInputError for anything that is not one."""
+    arrays = _read_npz(path)
+    missing = [name for name in _REQUIRED if name not in arrays]
+    if missing:
+        raise BadInputError(
+            f"{path} has no {', '.join(missing)}; expected the arrays {', '.join(_REQUIRED)}. "
+            "Is it another kind of NPZ?"
+        )
+    x, y, z = (np.asarray(arrays[name], np.float64) for name in "xyz")
+    shape = tuple(len(axis) if axis.ndim == 1 else -1 for axis in (x, y, z))
+    for name, expected in (("T", shape), ("p", shape), ("u", (*shape, 3))):
+        if arrays[name].shape != expected:
+            raise BadInputError(f"{path}: {name} has shape {arrays[name].shape}; expected {expected}.")
+        if not np.isfinite(arrays[name]).all():
+            raise BadInputError(f"{path}: {name} holds values that are not finite; export the volume again.")
+    for name, axis in zip("xyz", (x, y, z), strict=True):
+        if len(axis) < 2 or not np.isfinite(axis).all() or np.any(np.diff(axis) <= 0):
+            raise BadInputError(
+                f"{path}: the coordinates {name} do not increase, so the box has no volume; "
+                "expected at least two increasing values in metres."
+            )
+    _check_temperature(path, arrays["T"])
+    case = _case(path, arrays)
+    scalars = {k: v.item() for k, v in arrays.items() if v.ndim == 0 and v.dtype.kind in "fiu"}
+    return RoomVolume(
+        x_m=x,
+        y_m=y,
+        z_m=z,
+        temperature_k=np.asarray(arrays["T"], np.float32),
+        pressure_m2_s2=np.asarray(arrays["p"], np.float32),
+        velocity_m_s=np.asarray(arrays["u"], np.float32),
+        ambient_k=float(arrays["T0"]),
+        density_kg_m3=float(arrays.get("rho0", 1.2041)),
+        gladstone_dale_m3_kg=float(arrays.get("G", 2.26e-4)),
+        case=case,
+        scalars=scalars,
+    )
+
+
+def _read_npz(path: Path) -> dict[str, np.ndarray]:
+    if not path.is_file():
+        raise BadInputError(f"There is no volume {path}. Give an NPZ file with T, p and u of a room.")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            unpacked = sum(info.file_size for info in archive.infolist())
+        if unpacked > _LARGEST_BYTES:
+            raise BadInputError(
+                f"{path} unpacks to {unpacked / 1e9:.1f} GB; expected at most {_LARGEST_BYTES / 1e9:.1f} GB. "
+                "Resample it on a coarser grid."
+            )
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except (OSError, EOFError, ValueError, zipfile.BadZipFile, zipfile.LargeZipFile) as error:
+        raise BadInputError(
+            f"{path} is not a readable NPZ ({error}); it may be truncated. Copy it again."
+        ) from None
+
+
+def _check_temperature(path: Path, temperature_k: np.ndarray) -> None:
+    lowest, highest = float(temperature_k.min()), float(temperature_k.max())
+    if lowest <= 0 or highest > 5000:
+        hint = " Were degrees Celsius given for kelvin?" if -80 < lowest <= 0 else ""
+        raise BadInputError(
+            f"{path}: T runs from {lowest:g} to {highest:g}; expected kelvin, above 0 and below 5000.{hint}"
+        )
+
+
+def _case(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    if "meta_json" not in arrays:
+        return {}
+    try:
+        return dict(json.loads(str(arrays["meta_json"])).get("case", {}))
+    except (json.JSONDecodeError, AttributeError, TypeError) as error:
+        raise BadInputError(f"{path}: meta_json is not JSON ({error}); export the volume again.") from None
