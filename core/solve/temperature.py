@@ -1,0 +1,278 @@
+"""`draft`: temperature from the shifts and what is known of the temperature; no flow physics.
+
+Unknown is the excess refractivity n on a vertex grid, in which the data are linear. Minimised:
+
+    1/2 sum_w (A n - d)^T W (A n - d)                        the shifts, noise and representation error
+  + 1/2 sum_v (n - n_known)^2 / std^2                        planes, inlets, heaters
+  + 1/2 sum_m (mean_m n - n_mean)^2 / std^2                  outlets, sensors
+  + 1/2 int (dx n')^2 / sx^2 + (dy n')^2 / sy^2 + (dz n')^2 / sz^2      n' = n - prior
+
+One view sees integrals along its rays: across them the data decide, along them the prior (smooth: sy is
+small) and the known planes do. The prior is the known plane carried away from its wall, or nothing.
+
+Cost: conjugate gradients, two operator products an iteration, preconditioned by the smoothness term and
+the mean data term, which are diagonal under the cosine transform. Error: what varies along the rays and
+is not on a known plane stays unseen.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from jaxtyping import Float
+from scipy.sparse.linalg import LinearOperator, cg
+
+from core.knowledge import KnownTemperature, VertexGrid, known_temperature, plane_on_grid, wall_index
+from core.problem import Problem, ShiftMeasurement
+from core.result import Outcome, Solution
+from core.setting import SettingError, setting
+
+Volume = Float[np.ndarray, "nx ny nz"]
+OnEvent = Callable[[dict[str, Any]], object]
+
+
+class ShiftOperator(Protocol):
+    """The linear map from excess refractivity on vertices to displacements, and its transpose."""
+
+    def apply(self, values: Volume) -> Float[np.ndarray, "windows 2"]:
+        """Displacement [px] of every window."""
+        ...
+
+    def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Volume:
+        """The transposed map."""
+        ...
+
+
+@setting
+class TemperatureSettings:
+    """Smoothness in kelvin a metre (the expected size of gradients), and when to stop.
+
+    `across_k_m` and `along_k_m` are across and along the view; `representation` is the part of the shift's
+    size that this grid cannot represent, added to the noise.
+    """
+
+    across_k_m: float = 30.0
+    along_k_m: float = 1.0
+    representation: float = 0.03
+    tolerance: float = 1e-4
+    max_iterations: int = 400
+
+
+@dataclass(frozen=True)
+class _System:
+    """The quadratic problem in n, flattened."""
+
+    grid: VertexGrid
+    operators: tuple[ShiftOperator, ...]
+    weights: tuple[Float[np.ndarray, "windows 2 2"], ...]
+    known: KnownTemperature
+    per_k: float
+    stiffness: tuple[float, float, float]
+
+    def smooth(self, n: Volume) -> Volume:
+        """Gradient of the smoothness term."""
+        total = np.zeros_like(n)
+        for axis, factor in enumerate(self.stiffness):
+            difference = factor * np.diff(n, axis=axis)
+            low = [slice(None)] * 3
+            high = [slice(None)] * 3
+            low[axis], high[axis] = slice(None, -1), slice(1, None)
+            total[tuple(low)] -= difference
+            total[tuple(high)] += difference
+        return total
+
+    def known_terms(self, n: Volume) -> Volume:
+        """Hessian of the known values and means, times n."""
+        total = np.zeros_like(n)
+        mask = self.known.mask
+        total[mask] = n[mask] / (self.known.std_k[mask] * self.per_k) ** 2
+        flat = total.reshape(-1)
+        for members, _, std in self.known.means:
+            flat[members] += n.reshape(-1)[members].mean() / (len(members) * (std * self.per_k) ** 2)
+        return total
+
+    def data_terms(self, n: Volume) -> Volume:
+        """Hessian of the data, times n."""
+        total = np.zeros_like(n)
+        for operator, weight in zip(self.operators, self.weights, strict=True):
+            total += operator.transpose(np.einsum("wab,wb->wa", weight, operator.apply(n)))
+        return total
+
+
+def solve_temperature(
+    problem: Problem,
+    operators: tuple[ShiftOperator, ...],
+    grid: VertexGrid,
+    settings: TemperatureSettings,
+    on_event: OnEvent | None = None,
+) -> Solution:
+    """Temperature on `grid`; one operator a view. Raises SettingError for contradictory knowledge."""
+    started = time.perf_counter()
+    air = problem.scene.air
+    known = known_temperature(problem, grid)
+    if not known.mask.any() and not known.means:
+        raise SettingError(
+            "Nothing fixes the level of the temperature: deflections see only gradients. "
+            "Add an inlet, a plane field, an outlet's mean temperature, or a point sensor to the scene."
+        )
+    # Kelvin to excess refractivity at ambient: only scales weights, never values.
+    per_k = air.ambient_refractivity / air.ambient_temperature_k
+    prior = np.asarray(air.excess_refractivity(prior_temperature(problem, grid) - air.ambient_temperature_k))
+    weights = tuple(data_weight(s, settings.representation) for s in problem.shifts)
+    cell = float(np.prod(grid.spacing_m)) / float(np.prod(problem.scene.room.size_m))
+    scales = (settings.across_k_m, settings.along_k_m, settings.across_k_m)
+    stiffness = [cell / (h * s * per_k) ** 2 for h, s in zip(grid.spacing_m, scales, strict=True)]
+    # A room's worth of independent gradients: one a hundred vertices.
+    stiffness = [f * np.prod(grid.shape) / 100 for f in stiffness]
+    system = _System(grid, operators, weights, known, per_k, (stiffness[0], stiffness[1], stiffness[2]))
+    n, iterations, settled = _minimise(system, problem.shifts, prior, air, settings, on_event)
+    temperature = np.asarray(air.temperature_k(n + air.ambient_refractivity))
+    x, y, z = grid.axes_m
+    return Solution(
+        x_m=x,
+        y_m=y,
+        z_m=z,
+        temperature_k=temperature,
+        outcome=Outcome.converged if settled else Outcome.step_limit,
+        solver_s=time.perf_counter() - started,
+        history=iterations,
+        notes=(
+            "Temperature only: velocity and pressure are not solved for by this preset.",
+            "What varies along the line of sight comes from the prior, not from the images.",
+        ),
+    )
+
+
+def prior_temperature(problem: Problem, grid: VertexGrid) -> Volume:
+    """The first known plane's profile over height carried through the room; ambient without a plane.
+
+    Only the profile is carried: a jet in the plane is somewhere else a metre further on.
+    """
+    volume = np.full(grid.shape, problem.scene.air.ambient_temperature_k)
+    for plane in problem.planes[:1]:
+        axis, _ = wall_index(plane.wall)  # type: ignore[arg-type]
+        on_grid = np.expand_dims(plane_on_grid(grid, plane, plane.temperature_k), axis)
+        volume[...] = np.median(on_grid, axis=(0, 1), keepdims=True)
+    return volume
+
+
+def data_weight(shift: ShiftMeasurement, representation: float) -> Float[np.ndarray, "windows 2 2"]:
+    """Inverse covariance of noise and representation error; zero for windows far outside the rest."""
+    size = np.linalg.norm(shift.displacement_px, axis=1)
+    covariance = np.linalg.inv(shift.information_per_px2)
+    informed = np.trace(covariance, axis1=1, axis2=2) < 1.0
+    typical = float(np.sqrt(np.mean(np.minimum(size, np.percentile(size, 90)) ** 2)))
+    weight = np.linalg.inv(covariance + (representation * typical) ** 2 * np.eye(2))
+    # Beside a wall with a thermal layer inside a cell the pattern moves many times further: not this grid's.
+    outlier = size > 12 * typical + 6 * np.sqrt(np.trace(covariance, axis1=1, axis2=2))
+    return weight * (informed & ~outlier)[:, None, None]
+
+
+def _minimise(
+    system: _System,
+    shifts: tuple[ShiftMeasurement, ...],
+    prior: Volume,
+    air: Any,
+    settings: TemperatureSettings,
+    on_event: OnEvent | None,
+) -> tuple[Volume, tuple[dict[str, float], ...], bool]:
+    """Conjugate gradients on the departure from the prior."""
+    shape, known = system.grid.shape, system.known
+    rhs = -system.data_terms(prior) - system.known_terms(prior)
+    for operator, weight, shift in zip(system.operators, system.weights, shifts, strict=True):
+        rhs += operator.transpose(np.einsum("wab,wb->wa", weight, shift.displacement_px))
+    ambient = air.ambient_temperature_k
+    target = np.asarray(air.excess_refractivity(np.where(known.mask, known.temperature_k, ambient) - ambient))
+    rhs[known.mask] += (target / (known.std_k * system.per_k) ** 2)[known.mask]
+    for members, kelvin, std in known.means:
+        value = float(air.excess_refractivity(np.float64(kelvin - ambient)))
+        rhs.reshape(-1)[members] += value / (len(members) * (std * system.per_k) ** 2)
+
+    def hessian(flat: np.ndarray) -> np.ndarray:
+        n = flat.reshape(shape)
+        return (system.data_terms(n) + system.known_terms(n) + system.smooth(n)).ravel()
+
+    history: list[dict[str, float]] = []
+
+    def record(flat: np.ndarray) -> None:
+        history.append({"iteration": len(history) + 1.0, "change": float(np.abs(flat).max() / system.per_k)})
+        if on_event:
+            on_event(history[-1])
+
+    size = int(np.prod(shape))
+    found, info = cg(
+        LinearOperator((size, size), matvec=hessian, dtype=np.float64),
+        rhs.ravel(),
+        rtol=settings.tolerance,
+        maxiter=settings.max_iterations,
+        M=_preconditioner(system),
+        callback=record,
+    )
+    return prior + found.reshape(shape), tuple(history), info == 0
+
+
+def _preconditioner(system: _System) -> LinearOperator:
+    """Inverse of a separable stand-in: eigenvectors along x and z, a dense system along the view y.
+
+    The stand-in takes the view as parallel along y: data = c (Lx / hx^2 + Lz / hz^2) (x) w w^T, with the
+    lever arms w of the slabs measured on the operators themselves. Known planes pin their wall.
+    """
+    shape, spacing = system.grid.shape, system.grid.spacing_m
+    fx, fy, fz = system.stiffness
+    (lx, qx, dx), (lz, qz, dz) = (_modes(system, axis) for axis in (0, 2))
+    levers = _slab_levers(system)
+    smooth = fx * lx[:, None] + fz * lz[None]
+    across = dx[:, None] / spacing[0] ** 2 + dz[None] / spacing[2] ** 2
+    matrices = (
+        (smooth[..., None, None] + 1e-3 * fx * lx[1]) * np.eye(shape[1])
+        + fy * _laplacian(shape[1])
+        + across[..., None, None] * levers
+    )
+    inverses = np.linalg.inv(matrices)
+
+    def apply(flat: np.ndarray) -> np.ndarray:
+        modes = np.einsum("xi,xyz,zk->iky", qx, flat.reshape(shape), qz, optimize=True)
+        modes = (inverses @ modes[..., None])[..., 0]
+        return np.einsum("xi,iky,zk->xyz", qx, modes, qz, optimize=True).ravel()
+
+    size = int(np.prod(shape))
+    return LinearOperator((size, size), matvec=apply, dtype=np.float64)
+
+
+def _laplacian(n: int) -> Float[np.ndarray, "n n"]:
+    """Second differences of a line with free ends, positive."""
+    laplacian = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    laplacian[0, 0] = laplacian[-1, -1] = 1.0
+    return laplacian
+
+
+def _modes(
+    system: _System, axis: int
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n n"], Float[np.ndarray, " n"]]:
+    """Modes along an axis whose known end planes are pinned: smoothness, vectors, unpinned curvature."""
+    laplacian = _laplacian(system.grid.shape[axis])
+    pinned = laplacian.copy()
+    mask, std = (np.moveaxis(v, axis, 0) for v in (system.known.mask, system.known.std_k))
+    for end in (0, -1):
+        if mask[end].mean() > 0.5:
+            weight = np.mean(1 / (std[end][mask[end]] * system.per_k) ** 2)
+            pinned[end, end] += weight / system.stiffness[axis]
+    values, vectors = np.linalg.eigh(pinned)
+    return values, vectors, np.einsum("ai,ab,bi->i", vectors, laplacian, vectors)
+
+
+def _slab_levers(system: _System) -> Float[np.ndarray, "ny ny"]:
+    """Hessian of the data for a unit gradient across the view, slab by slab along y, a vertex of the face."""
+    shape, spacing = system.grid.shape, system.grid.spacing_m
+    total = np.zeros((shape[1], shape[1]))
+    for operator, weight in zip(system.operators, system.weights, strict=True):
+        shifts = []
+        for j in range(shape[1]):
+            ramp = np.zeros(shape)
+            ramp[:, j, :] = (np.arange(shape[0]) * spacing[0])[:, None]
+            shifts.append(operator.apply(ramp))
+        stacked = np.stack(shifts)
+        total += np.einsum("iwa,wab,jwb->ij", stacked, weight, stacked, optimize=True)
+    return total / (shape[0] * shape[2])
