@@ -14,11 +14,14 @@ from app.truth import RoomVolume, read_volume
 from core.fields import GridField
 from core.geometry import Box, Optics, rotation_matrix, rotation_vector
 from core.render import render_flow, render_reference
-from core.scene import Scene
+from core.scene import FixedTexture, Scene, WaveletPattern
 from drivers.protocols import Camera
 from drivers.simulated import SensorNoise, SimulatedCamera
 
 AirState = Literal["still", "moving"]
+
+# The print around a simulated room: as fine as the pattern, but another one.
+FRAME_SEED = 1_000_003
 
 
 def open_camera(experiment: Experiment, air: AirState, view: int = 0) -> Camera:
@@ -54,9 +57,30 @@ def _render(
     experiment: Experiment, settings: SimulatedCameraSettings, scene: Scene, air: AirState, view: int
 ) -> Float32[np.ndarray, "rows cols"]:
     if air == "still":
-        return render_reference(scene, view)
-    volume = read_volume(experiment.file(settings.room))
-    return render_flow(scene, volume_field(volume, scene), view)
+        image = render_reference(scene, view)
+    else:
+        volume = read_volume(experiment.file(settings.room))
+        image = render_flow(scene, volume_field(volume, scene), view)
+    return _framed(image, scene, view)
+
+
+def _framed(
+    image: Float32[np.ndarray, "rows cols"], scene: Scene, view: int
+) -> Float32[np.ndarray, "rows cols"]:
+    """The picture in a printed frame: what lies beyond the wall is still, and shows the camera's drift."""
+    beyond = image == 0
+    if not beyond.any():
+        return image
+    room, reach_m = scene.room, 0.1 * max(scene.room.size_m)
+    (x0, y0, z0), (x1, y1, z1) = room.lower_m, room.upper_m
+    wide = Box(lower_m=(x0 - reach_m, y0, z0 - reach_m), upper_m=(x1 + reach_m, y1, z1 + reach_m))
+    camera_px_m = (y1 - scene.views[view].camera.position_m[1]) / scene.views[view].camera.focal_px[0]
+    frame_scene = replace(
+        scene,
+        room=wide,
+        light=FixedTexture(pattern=WaveletPattern(seed=FRAME_SEED, finest_px=6.0), pixel_m=camera_px_m / 2),
+    )
+    return np.where(beyond, render_reference(frame_scene, view), image)
 
 
 def volume_field(volume: RoomVolume, scene: Scene) -> GridField:

@@ -163,7 +163,10 @@ def _covering(room: Box, size_px: tuple[int, int], stand_off_m: float, baseline_
 def _light(room: Box, camera: Optics, options: RigOptions) -> Light:
     pixel_m = options.stand_off_m / camera.focal_px[0]
     if options.light == "texture":
-        return FixedTexture(pattern=WaveletPattern(seed=options.pattern_seed), pixel_m=pixel_m)
+        # Printed twice as fine as the camera's pixels; the finest band is 3 camera pixels.
+        return FixedTexture(
+            pattern=WaveletPattern(seed=options.pattern_seed, finest_px=6.0), pixel_m=pixel_m / 2
+        )
     projector = _covering(room, options.projector_px, options.stand_off_m, options.baseline_m)
     # The finest band: at least 2 projector pixels and at least 3 camera pixels.
     magnification = camera.focal_px[0] / projector.focal_px[0]

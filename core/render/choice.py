@@ -10,7 +10,8 @@ from core.scene import Scene
 from core.setting import SettingError
 
 _LEAST_STEPS, _MOST_STEPS = 64, 512
-_SAMPLES = 4
+# With fewer the replicas of the pattern alias in the camera: shifts wrong by 0.5 % with 4, 0.1 % with 9.
+_SAMPLES = 9
 # Features of room air are no finer; what a cone blurs below that is not seen.
 _WIDE_CONE_M = 0.02
 # Rays a cell of the field along each axis of the sensor, from which neighbours may share one.

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Float32
+from scipy.ndimage import spline_filter
 
 from core.geometry import Box
 from core.pattern import make_pattern
@@ -78,35 +79,51 @@ def texture_size(room: Box, pixel_m: float) -> tuple[int, int]:
 
 
 def pattern_image(scene: Scene) -> Float32[np.ndarray, "rows cols"]:
-    """The scene's pattern at its own resolution, 0 to 1; the last two are kept."""
+    """Cubic B-spline coefficients of the scene's pattern, for `sample_pattern`; the last two are kept."""
     return _made(scene.light.pattern, *pattern_size(scene))
 
 
 @lru_cache(maxsize=2)
 def _made(pattern: Pattern, rows: int, cols: int) -> Float32[np.ndarray, "rows cols"]:
-    return make_pattern(pattern, rows, cols)
+    luminance = make_pattern(pattern, rows, cols)
+    return spline_filter(luminance, order=3, output=np.float64, mode="mirror").astype(np.float32)
 
 
 def sample_pattern(
-    pattern: Float[Array, "rows cols"], cell: Array, offset_px: Float[Array, "rays 2"]
+    coefficients: Float[Array, "rows cols"], cell: Array, offset_px: Float[Array, "rays 2"]
 ) -> Float[Array, " rays"]:
-    """Bilinear luminance at `cell` + `offset_px` (column, row); 0 outside the pattern.
+    """Luminance at `cell` + `offset_px` (column, row) by cubic B-spline; 0 outside the pattern.
 
     The whole-pixel part travels as integers: a float32 coordinate at 4096 has a step of 5e-4 px, a tenth
-    of the shifts that are to be seen.
+    of the shifts that are to be seen. Bilinear sampling will not do: its slope is a secant that jumps at
+    the pattern's pixels, and a camera whose pixels are commensurate with them then sees shifts that are
+    wrong by 5 to 15 %; the cubic spline's are right to 0.7 %.
     """
-    rows, cols = pattern.shape
+    rows, cols = coefficients.shape
     whole = jnp.floor(offset_px)
     fraction = offset_px - whole
     col, row = jnp.moveaxis(cell + whole.astype(jnp.int32), -1, 0)
     inside = (col >= -1) & (col < cols) & (row >= -1) & (row < rows)
-    flat = pattern.reshape(-1)
-    c0, c1 = jnp.clip(col, 0, cols - 1), jnp.clip(col + 1, 0, cols - 1)
-    r0, r1 = jnp.clip(row, 0, rows - 1) * cols, jnp.clip(row + 1, 0, rows - 1) * cols
-    take = lambda index: flat.at[index].get(mode="promise_in_bounds")  # noqa: E731
-    upper = take(r0 + c0) + fraction[:, 0] * (take(r0 + c1) - take(r0 + c0))
-    lower = take(r1 + c0) + fraction[:, 0] * (take(r1 + c1) - take(r1 + c0))
-    return jnp.where(inside, upper + fraction[:, 1] * (lower - upper), 0.0)
+    flat = coefficients.reshape(-1)
+    columns = [jnp.clip(col + i, 0, cols - 1) for i in range(-1, 3)]
+    across, down = _cubic_weights(fraction[:, 0]), _cubic_weights(fraction[:, 1])
+    total = jnp.zeros_like(fraction[:, 0])
+    for i, weight in zip(range(-1, 3), down, strict=True):
+        start = jnp.clip(row + i, 0, rows - 1) * cols
+        line = [flat.at[start + c].get(mode="promise_in_bounds") for c in columns]
+        total = total + weight * sum(w * value for w, value in zip(across, line, strict=True))
+    return jnp.where(inside, total, 0.0)
+
+
+def _cubic_weights(t: Float[Array, " rays"]) -> tuple[Float[Array, " rays"], ...]:
+    """Values of the four cubic B-splines over a cell at 0 <= t < 1."""
+    s = 1.0 - t
+    return (
+        s * s * s / 6.0,
+        2.0 / 3.0 - 0.5 * t * t * (2.0 - t),
+        2.0 / 3.0 - 0.5 * s * s * (2.0 - s),
+        t * t * t / 6.0,
+    )
 
 
 def coordinate_jacobian(light: AbstractPatternMap, wall_point_m: Float[Array, "3"]) -> Float[Array, "2 3"]:

@@ -1,0 +1,36 @@
+"""`airlens report` and `airlens export`."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+Result = Annotated[Path | None, typer.Option(help="Result folder; the newest by default.")]
+
+
+def register(cli: typer.Typer) -> None:
+    """Add `report` and `export`."""
+    cli.command()(report)
+    cli.command()(export)
+
+
+def report(
+    experiment: Annotated[Path, typer.Argument(help="Experiment folder.")],
+    result: Result = None,
+) -> None:
+    """Write the report of a result: one HTML file that needs no network."""
+    from app.report import write_report
+
+    typer.echo(str(write_report(experiment, result)))
+
+
+def export(
+    experiment: Annotated[Path, typer.Argument(help="Experiment folder.")],
+    kind: Annotated[Literal["nc", "vti", "csv"], typer.Option("--format", help="File format.")] = "nc",
+    output: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,
+    result: Result = None,
+) -> None:
+    """Write a result as NetCDF, VTK image data (ParaView), or CSV."""
+    from app.export import export as run
+
+    typer.echo(str(run(experiment, kind, output, result)))

@@ -1,0 +1,76 @@
+"""`airlens simulate`."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.progress import Progress
+
+Size = Annotated[str, typer.Option(help="Camera size, WIDTHxHEIGHT or WIDTH (3:4).")]
+
+
+def register(cli: typer.Typer) -> None:
+    """Add `simulate`."""
+    cli.command()(simulate)
+
+
+def simulate(
+    experiment: Annotated[Path, typer.Argument(help="New experiment folder.")],
+    truth: Annotated[Path, typer.Option(help="Room volume (NPZ).")],
+    light: Annotated[
+        Literal["texture", "projector"], typer.Option(help="What patterns the wall.")
+    ] = "texture",
+    information: Annotated[
+        Literal["paper", "operator", "surveyed"], typer.Option(help="What is told of the boundary.")
+    ] = "operator",
+    camera_px: Size = "4096x3072",
+    frames: Annotated[int, typer.Option(min=1, help="Frames averaged in each capture.")] = 100,
+    full_well: Annotated[float, typer.Option(help="Full well of a pixel [e-].")] = 10_000.0,
+    drift_px: Annotated[float, typer.Option(min=0.0, help="Drift between the two exposures [px].")] = 0.1,
+    stand_off: Annotated[float, typer.Option(help="Camera to back wall [m].")] = 30.5,
+    baseline: Annotated[
+        tuple[float, float], typer.Option(help="Projector minus camera, horizontal and vertical [m].")
+    ] = (1.0, 0.0),
+    noise_free: Annotated[
+        bool, typer.Option("--noise-free", help="No shot, read or rounding noise.")
+    ] = False,
+    seed: Annotated[int, typer.Option(help="Seed of pattern, noise and drift.")] = 0,
+) -> None:
+    """Make a complete experiment from a room volume: scene, calibration, reference and flow captures."""
+    from app.rig_settings import SimulatedCameraSettings
+    from app.room_scene import RigOptions
+    from app.simulate import simulate as run
+
+    options = RigOptions(
+        camera_px=parse_size(camera_px),
+        light=light,
+        frames=frames,
+        full_well_e=full_well,
+        stand_off_m=stand_off,
+        baseline_m=baseline,
+        pattern_seed=seed,
+    )
+    camera = SimulatedCameraSettings(seed=seed, drift_px=drift_px, noise_free=noise_free)
+    with Progress(transient=True) as progress:
+        tasks = {}
+
+        def stage(name: str, done: int, total: int) -> None:
+            if name not in tasks:
+                tasks[name] = progress.add_task(f"{name} capture", total=total)
+            progress.update(tasks[name], completed=done)
+
+        run(truth, experiment, options, information, camera, stage)
+    typer.echo(f"{experiment}: reference and flow captured. Next: airlens reconstruct {experiment}")
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """'4096x3072' or '4096' (height three quarters) to (width, height). Raises BadInputError."""
+    from app.errors import BadInputError
+
+    parts = text.lower().split("x")
+    if not all(p.isdigit() for p in parts) or len(parts) > 2:
+        raise BadInputError(
+            f"The camera size is {text!r}; expected WIDTHxHEIGHT in pixels, such as 4096x3072."
+        )
+    width = int(parts[0])
+    return width, int(parts[1]) if len(parts) == 2 else width * 3 // 4

@@ -1,0 +1,153 @@
+"""Figures of the report: one function a picture, drawn with Matplotlib's object interface, no global state."""
+
+import base64
+import io
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from core.problem import ShiftMeasurement
+from core.result import Solution
+
+# Perceptually even and safe for colour-blind eyes.
+SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"
+
+
+def as_png(figure: Figure, dpi: int = 110) -> bytes:
+    """The figure as a PNG."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
+
+
+def as_data_uri(figure: Figure) -> str:
+    """The figure as an address for an `img` element of an offline page."""
+    return "data:image/png;base64," + base64.b64encode(as_png(figure)).decode("ascii")
+
+
+def images_figure(reference: np.ndarray, flow: np.ndarray) -> Figure:
+    """Reference, flow, and their difference, which is all that the eye can be shown of it."""
+    figure = Figure(figsize=(13, 3.9), layout="constrained")
+    axes = figure.subplots(1, 3)
+    step = max(1, reference.shape[1] // 800)
+    small = [image[::step, ::step] for image in (reference, flow)]
+    high = float(np.percentile(small[0], 99.5))
+    for axis, image, title in zip(axes, small, ("reference image", "flow image"), strict=False):
+        axis.imshow(image, cmap="gray", vmin=0, vmax=high)
+        axis.set_title(title)
+    difference = small[1] - small[0]
+    limit = float(np.percentile(np.abs(difference), 99)) or 1e-6
+    drawn = axes[2].imshow(difference, cmap=DIVERGING, vmin=-limit, vmax=limit)
+    axes[2].set_title("flow minus reference")
+    figure.colorbar(drawn, ax=axes[2], label="part of full scale", shrink=0.85)
+    for axis in axes:
+        axis.set_axis_off()
+    return figure
+
+
+def shift_figure(shift: ShiftMeasurement) -> Figure:
+    """Both components of the measured displacement, window by window [mpx], and its direction."""
+    figure = Figure(figsize=(13, 4.2), layout="constrained")
+    axes = figure.subplots(1, 2)
+    limit = 1e3 * float(np.percentile(np.abs(shift.displacement_px), 98)) or 1e-3
+    columns, rows = (np.unique(shift.centres_px[:, i]) for i in (0, 1))
+    picture = np.full((len(rows), len(columns), 2), np.nan)
+    at = np.searchsorted(rows, shift.centres_px[:, 1]), np.searchsorted(columns, shift.centres_px[:, 0])
+    picture[at] = 1e3 * shift.displacement_px
+    extent = (columns[0], columns[-1], rows[-1], rows[0])
+    for axis, index, title in ((axes[0], 0, "to the right"), (axes[1], 1, "downwards")):
+        drawn = axis.imshow(
+            picture[..., index],
+            cmap=DIVERGING,
+            vmin=-limit,
+            vmax=limit,
+            extent=extent,
+            interpolation="nearest",
+        )
+        axis.set_title(f"shift of the pattern, {title}")
+        axis.set_xlabel("column [px]")
+        axis.set_ylabel("row [px]")
+        figure.colorbar(drawn, ax=axis, label="1/1000 px", shrink=0.85)
+    return figure
+
+
+def slices_figure(solution: Solution, ambient_k: float) -> Figure:
+    """Temperature excess on three middle planes, with arrows of velocity where it is known."""
+    figure = Figure(figsize=(13, 4.2), layout="constrained")
+    axes = figure.subplots(1, 3)
+    excess = solution.temperature_k - ambient_k
+    low, high = np.percentile(excess, [0.5, 99.5])
+    for axis, normal in zip(axes, (1, 0, 2), strict=True):
+        drawn = _slice(axis, solution, excess, normal, SEQUENTIAL, float(low), float(high))
+    figure.colorbar(drawn, ax=axes, label="T - T0 [K]", shrink=0.85)
+    return figure
+
+
+def error_figure(solution: Solution, error_k: np.ndarray) -> Figure:
+    """Temperature minus truth on the same planes, on the solution's vertices."""
+    figure = Figure(figsize=(13, 4.2), layout="constrained")
+    axes = figure.subplots(1, 3)
+    limit = float(np.percentile(np.abs(error_k[1:-1, 1:-1, 1:-1]), 98)) or 1e-6
+    for axis, normal in zip(axes, (1, 0, 2), strict=True):
+        drawn = _slice(axis, solution, error_k, normal, DIVERGING, -limit, limit, arrows=False)
+    figure.colorbar(drawn, ax=axes, label="T - true T [K]", shrink=0.85)
+    return figure
+
+
+def _slice(
+    axis,
+    solution: Solution,
+    values: np.ndarray,
+    normal: int,
+    cmap: str,
+    low: float,
+    high: float,
+    arrows: bool = True,
+):
+    coordinates = (solution.x_m, solution.y_m, solution.z_m)
+    across, up = [i for i in range(3) if i != normal]
+    middle = len(coordinates[normal]) // 2
+    drawn = axis.pcolormesh(
+        coordinates[across],
+        coordinates[up],
+        np.take(values, middle, axis=normal).T,
+        cmap=cmap,
+        vmin=low,
+        vmax=high,
+        shading="gouraud",
+    )
+    if arrows and solution.velocity_m_s is not None:
+        _arrows(axis, np.take(solution.velocity_m_s, middle, axis=normal), coordinates, across, up)
+    axis.set_aspect("equal")
+    axis.set_title(f"{'xyz'[normal]} = {coordinates[normal][middle]:.2f} m")
+    axis.set_xlabel(f"{'xyz'[across]} [m]")
+    axis.set_ylabel(f"{'xyz'[up]} [m]")
+    return drawn
+
+
+def _arrows(axis, velocity: np.ndarray, coordinates, across: int, up: int) -> None:
+    step_a, step_u = (max(1, len(coordinates[i]) // 18) for i in (across, up))
+    part = velocity[::step_a, ::step_u]
+    axis.quiver(
+        coordinates[across][::step_a],
+        coordinates[up][::step_u],
+        part[..., across].T,
+        part[..., up].T,
+        color="white",
+        width=0.003,
+        alpha=0.9,
+    )
+
+
+def shift_field_figure(displacement_px: np.ndarray) -> Figure:
+    """A dense displacement field: both components [px]."""
+    figure = Figure(figsize=(11, 6), layout="constrained")
+    axes = figure.subplots(1, 2)
+    limit = float(np.percentile(np.abs(displacement_px), 99)) or 1e-3
+    for axis, index, title in ((axes[0], 0, "to the right"), (axes[1], 1, "downwards")):
+        drawn = axis.imshow(displacement_px[..., index], cmap=DIVERGING, vmin=-limit, vmax=limit)
+        axis.set_title(f"displacement, {title}")
+        axis.set_xlabel("column [px]")
+        axis.set_ylabel("row [px]")
+    figure.colorbar(drawn, ax=axes, label="px", shrink=0.8)
+    return figure

@@ -1,0 +1,100 @@
+"""The story on one screen: load the calibration, build the scene, check it, measure, solve, keep, report."""
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.check import rendered_agreement
+from app.configuration import to_plain
+from app.durable import write_text
+from app.experiment import Experiment, new_id, open_experiment, write_manifest
+from app.measure import Measurement, measure, with_calibration
+from app.presets import preset as preset_called
+from app.provenance import provenance
+from app.report import write_report
+from app.results import write_result
+from app.shift_files import write_shifts
+from core.result import Solution
+
+OnStage = Callable[[str], object]
+OnEvent = Callable[[dict[str, Any]], object]
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """A finished reconstruction: its folder, the air, and what was measured."""
+
+    folder: Path
+    solution: Solution
+    measurement: Measurement
+    wall_s: float
+
+
+def reconstruct(
+    folder: Path,
+    preset: str = "draft",
+    *,
+    on_stage: OnStage = lambda stage: None,
+    on_event: OnEvent | None = None,
+) -> Reconstruction:
+    """Reconstruct the newest captures of an experiment. Raises BadInputError, SettingError."""
+    started = time.perf_counter()
+    solve = preset_called(preset)
+    experiment = open_experiment(folder)
+    on_stage("load the calibration")
+    scene, calibrated = with_calibration(experiment.settings.scene, experiment.bundle_path)
+    on_stage("measure the shift of the pattern")
+    measurement = measure(experiment, scene)
+    on_stage("check the rendered reference against the captured one")
+    checked = rendered_agreement(scene, measurement.references)
+    on_stage(f"solve ({preset})")
+    solution = solve(measurement.problem, on_event=on_event)
+    on_stage("keep the result")
+    assumed = (calibrated, *measurement.notes, checked, *solution.notes)
+    result = _keep(experiment, preset, measurement, solution, assumed, time.perf_counter() - started)
+    on_stage("report")
+    write_report(experiment.folder, result)
+    return Reconstruction(result, solution, measurement, time.perf_counter() - started)
+
+
+def _keep(
+    experiment: Experiment,
+    preset: str,
+    measurement: Measurement,
+    solution: Solution,
+    assumed: tuple[str, ...],
+    wall_s: float,
+) -> Path:
+    folder = experiment.results_folder / new_id(experiment.results_folder, preset)
+    folder.mkdir(parents=True)
+    captures = {role: experiment.latest_capture(role) for role in ("reference", "flow")}
+    write_result(
+        folder / "result.nc",
+        solution,
+        {"title": experiment.settings.title, "preset": preset, "assumed": "\n".join(assumed)},
+    )
+    write_shifts(folder, measurement.problem.shifts)
+    lines = (json.dumps({k: float(np.float64(v)) for k, v in row.items()}) for row in solution.history)
+    write_text(folder / "history.jsonl", "".join(line + "\n" for line in lines))
+    write_manifest(
+        folder,
+        {
+            "schema_version": 1,
+            "preset": preset,
+            "outcome": solution.outcome.name,
+            "advice": solution.outcome.value,
+            "solver_s": solution.solver_s,
+            "wall_s": wall_s,
+            "assumed": list(assumed),
+            "captures": {role: path.name for role, path in captures.items()},
+            "windows": [len(shift.displacement_px) for shift in measurement.problem.shifts],
+            "settings": to_plain(experiment.settings),
+        }
+        | provenance({f"{role}_manifest": path / "manifest.json" for role, path in captures.items()}),
+    )
+    return folder

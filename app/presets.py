@@ -1,0 +1,30 @@
+"""Named ways to solve: what each costs and what it bought is in README, measured by `airlens bench`."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from app.errors import BadInputError
+from core.problem import Problem
+from core.result import Solution
+from core.solve.draft import solve_draft
+
+OnEvent = Callable[[dict[str, Any]], object]
+
+
+class Solve(Protocol):
+    """A road from a problem to the air."""
+
+    def __call__(self, problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+        """Solve, reporting every recorded iteration."""
+        ...
+
+
+PRESETS: Mapping[str, Solve] = {"draft": solve_draft}
+
+
+def preset(name: str) -> Solve:
+    """The preset called `name`. Raises BadInputError."""
+    try:
+        return PRESETS[name]
+    except KeyError:
+        raise BadInputError(f"There is no preset {name!r}; known: {', '.join(PRESETS)}.") from None

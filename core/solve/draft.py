@@ -1,0 +1,52 @@
+"""`draft` for a problem: choose the grid, build the straight-ray operators, solve for the temperature."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from core.knowledge import VertexGrid
+from core.problem import Problem
+from core.rays.operator import StraightRayOperator, build
+from core.result import Solution
+from core.scene import Scene
+from core.solve.temperature import OnEvent, TemperatureSettings, solve_temperature
+
+_apply = jax.jit(lambda operator, values: operator.apply(values))
+_transpose = jax.jit(lambda operator, shift: operator.transpose(shift))
+
+
+class _OnTheDevice:
+    """A `ShiftOperator` for NumPy arrays: compiled once, the weights passed as arguments."""
+
+    def __init__(self, operator: StraightRayOperator) -> None:
+        self._operator = operator
+
+    def apply(self, values: Float[np.ndarray, "nx ny nz"]) -> Float[np.ndarray, "windows 2"]:
+        return np.asarray(_apply(self._operator, jnp.asarray(values, jnp.float32)), np.float64)
+
+    def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Float[np.ndarray, "nx ny nz"]:
+        shift = jnp.asarray(displacement_px, jnp.float32)
+        return np.asarray(_transpose(self._operator, shift), np.float64)
+
+
+def draft_grid(scene: Scene) -> VertexGrid:
+    """48 cells along the room's longest side, cubes but for the view's axis, where nothing finer is seen."""
+    size = scene.room.size_m
+    longest = 48 if scene.solve.grid == "auto" else scene.solve.grid
+    spacing = max(size) / longest
+    counts = [int(np.clip(round(s / spacing), 8, longest)) + 1 for s in size]
+    counts[1] = max(9, (counts[1] + 1) // 2)
+    return VertexGrid(scene.room, (counts[0], counts[1], counts[2]))
+
+
+def solve_draft(
+    problem: Problem, settings: TemperatureSettings | None = None, *, on_event: OnEvent | None = None
+) -> Solution:
+    """Temperature in at most some ten seconds. Raises SettingError."""
+    grid = draft_grid(problem.scene)
+    operators = tuple(
+        _OnTheDevice(build(problem.scene, view, shift.centres_px, grid.shape))
+        for view, shift in enumerate(problem.shifts)
+    )
+    return solve_temperature(problem, operators, grid, settings or TemperatureSettings(), on_event)
