@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float32
 
+from core.geometry import crop
 from core.render import render_reference
 from core.scene import Scene
 
@@ -31,9 +32,8 @@ def _correlation(scene: Scene, view: int, image: Float32[np.ndarray, "rows cols"
     camera = scene.views[view].camera
     cols, rows = min(_CROP_PX, camera.width_px), min(_CROP_PX, camera.height_px)
     left, top = (camera.width_px - cols) // 2, (camera.height_px - rows) // 2
-    cx, cy = camera.principal_px
-    crop = replace(camera, width_px=cols, height_px=rows, principal_px=(cx - left, cy - top))
-    views = [replace(v, camera=crop) if i == view else v for i, v in enumerate(scene.views)]
+    middle = crop(camera, slice(top, top + rows), slice(left, left + cols))
+    views = [replace(v, camera=middle) if i == view else v for i, v in enumerate(scene.views)]
     rendered = render_reference(replace(scene, views=tuple(views)), view)
     captured = image[top : top + rows, left : left + cols]
     if rendered.std() == 0 or captured.std() == 0:

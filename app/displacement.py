@@ -37,7 +37,8 @@ def shift_field(reference: Image, flow: Image, window_px: int = 21, remove_drift
     low, high = np.percentile(reference, [0.1, 99.9])
     scale = 255.0 / max(float(high - low), 1e-6)
     a, b = (np.clip((image - low) * scale, 0, 255).astype(np.float32) for image in (reference, flow))
-    field = cv2.calcOpticalFlowFarneback(a, b, None, 0.5, 3, window_px, 5, 7, 1.5, 0)
+    start = np.zeros((*a.shape, 2), np.float32)
+    field = cv2.calcOpticalFlowFarneback(a, b, start, 0.5, 3, window_px, 5, 7, 1.5, 0)
     std = _standard_deviation(a, b, field, window_px)
     drift = None
     if remove_drift:

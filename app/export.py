@@ -2,7 +2,7 @@
 
 import shutil
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pyevtk.hl import imageToVTK
@@ -35,7 +35,7 @@ def export(folder: Path, kind: ExportFormat, output: Path | None = None, result:
 def _write_vti(path: Path, solution: Solution) -> None:
     """VTK image data (XML): evenly spaced vertices, T, p and vectors as point data."""
     dataset = to_dataset(solution, {})
-    points = {
+    points: dict[str, Any] = {
         str(name): np.asfortranarray(dataset[name].to_numpy())
         for name in dataset.data_vars
         if name not in ("u", "v", "w")

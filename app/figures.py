@@ -77,9 +77,11 @@ def slices_figure(solution: Solution, ambient_k: float) -> Figure:
     axes = figure.subplots(1, 3)
     excess = solution.temperature_k - ambient_k
     low, high = np.percentile(excess, [0.5, 99.5])
-    for axis, normal in zip(axes, (1, 0, 2), strict=True):
-        drawn = _slice(axis, solution, excess, normal, SEQUENTIAL, float(low), float(high))
-    figure.colorbar(drawn, ax=axes, label="T - T0 [K]", shrink=0.85)
+    drawn = [
+        _slice(axis, solution, excess, normal, SEQUENTIAL, float(low), float(high))
+        for axis, normal in zip(axes, (1, 0, 2), strict=True)
+    ]
+    figure.colorbar(drawn[0], ax=axes, label="T - T0 [K]", shrink=0.85)
     return figure
 
 
@@ -88,9 +90,11 @@ def error_figure(solution: Solution, error_k: np.ndarray) -> Figure:
     figure = Figure(figsize=(13, 4.2), layout="constrained")
     axes = figure.subplots(1, 3)
     limit = float(np.percentile(np.abs(error_k[1:-1, 1:-1, 1:-1]), 98)) or 1e-6
-    for axis, normal in zip(axes, (1, 0, 2), strict=True):
-        drawn = _slice(axis, solution, error_k, normal, DIVERGING, -limit, limit, arrows=False)
-    figure.colorbar(drawn, ax=axes, label="T - true T [K]", shrink=0.85)
+    drawn = [
+        _slice(axis, solution, error_k, normal, DIVERGING, -limit, limit, arrows=False)
+        for axis, normal in zip(axes, (1, 0, 2), strict=True)
+    ]
+    figure.colorbar(drawn[0], ax=axes, label="T - true T [K]", shrink=0.85)
     return figure
 
 

@@ -1,6 +1,7 @@
 """Results on disk: result.nc (NetCDF, CF names and units) and its way back into a `Solution`."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -68,7 +69,7 @@ def read_result(path: Path) -> Solution:
     try:
         with xr.open_dataset(path, engine="h5netcdf") as dataset:
             data = dataset.load()
-        fields = {
+        fields: dict[str, Any] = {
             name: data[entry[0]].to_numpy() if entry[0] in data else None for name, entry in _VOLUMES.items()
         }
         for name, (stem, _) in _VECTORS.items():

@@ -10,9 +10,10 @@ from jaxtyping import Float32
 from app.errors import BadInputError
 from app.experiment import Experiment
 from app.rig_settings import SimulatedCameraSettings
+from app.room_scene import FINEST_PX
 from app.truth import RoomVolume, read_volume
 from core.fields import GridField
-from core.geometry import Box, Optics, rotation_matrix, rotation_vector
+from core.geometry import Box, Optics, crop, rotation_matrix, rotation_vector
 from core.render import render_flow, render_reference
 from core.scene import FixedTexture, Scene, WaveletPattern
 from drivers.protocols import Camera
@@ -69,18 +70,39 @@ def _framed(
 ) -> Float32[np.ndarray, "rows cols"]:
     """The picture in a printed frame: what lies beyond the wall is still, and shows the camera's drift."""
     beyond = image == 0
-    if not beyond.any():
-        return image
     room, reach_m = scene.room, 0.1 * max(scene.room.size_m)
     (x0, y0, z0), (x1, y1, z1) = room.lower_m, room.upper_m
     wide = Box(lower_m=(x0 - reach_m, y0, z0 - reach_m), upper_m=(x1 + reach_m, y1, z1 + reach_m))
-    camera_px_m = (y1 - scene.views[view].camera.position_m[1]) / scene.views[view].camera.focal_px[0]
-    frame_scene = replace(
-        scene,
-        room=wide,
-        light=FixedTexture(pattern=WaveletPattern(seed=FRAME_SEED, finest_px=6.0), pixel_m=camera_px_m / 2),
+    camera = scene.views[view].camera
+    camera_px_m = (y1 - camera.position_m[1]) / camera.focal_px[0]
+    print_ = FixedTexture(
+        pattern=WaveletPattern(seed=FRAME_SEED, finest_px=FINEST_PX), pixel_m=camera_px_m / 2
     )
-    return np.where(beyond, render_reference(frame_scene, view), image)
+    frame_scene = replace(scene, room=wide, light=print_)
+    framed = image.copy()
+    for strip in _strips_around(~beyond):
+        part = replace(scene.views[view], camera=crop(camera, *strip))
+        views = tuple(part if i == view else v for i, v in enumerate(scene.views))
+        drawn = render_reference(replace(frame_scene, views=views), view)
+        framed[strip] = np.where(beyond[strip], drawn, image[strip])
+    return framed
+
+
+def _strips_around(inside: np.ndarray) -> list[tuple[slice, slice]]:
+    """The four strips (rows, columns) around the bounding box of what is inside."""
+    rows, cols = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return [(slice(0, inside.shape[0]), slice(0, inside.shape[1]))]
+    # One pixel more, for a box that is not quite upright in the picture.
+    top, bottom = int(rows[0]) + 2, int(rows[-1]) - 1
+    left, right = int(cols[0]) + 2, int(cols[-1]) - 1
+    strips = [
+        (slice(0, top), slice(0, inside.shape[1])),
+        (slice(bottom, inside.shape[0]), slice(0, inside.shape[1])),
+        (slice(top, bottom), slice(0, left)),
+        (slice(top, bottom), slice(right, inside.shape[1])),
+    ]
+    return [(r, c) for r, c in strips if r.stop > r.start and c.stop > c.start]
 
 
 def volume_field(volume: RoomVolume, scene: Scene) -> GridField:

@@ -3,6 +3,7 @@
 World: right-handed, metres, z up. Optics: OpenCV axes (+z forward, +y down).
 """
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -85,6 +86,17 @@ class Optics:
     def rotation(self) -> Float[np.ndarray, "3 3"]:
         """`optics_from_world` as a float64 matrix."""
         return rotation_matrix(self.rotation_rad)
+
+
+def crop(optics: Optics, rows: slice, cols: slice) -> Optics:
+    """The optics of a rectangle of the picture: the same rays, pixel (0, 0) at its corner."""
+    cx, cy = optics.principal_px
+    return replace(
+        optics,
+        width_px=cols.stop - cols.start,
+        height_px=rows.stop - rows.start,
+        principal_px=(cx - cols.start, cy - rows.start),
+    )
 
 
 def rotation_matrix(rotation_rad: Vector3) -> Float[np.ndarray, "3 3"]:

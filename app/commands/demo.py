@@ -20,7 +20,7 @@ def demo(
         Path, typer.Argument(help="Where to put the experiment; replaced if it is a demo.")
     ] = Path("demo"),
     camera_px: Annotated[int, typer.Option(min=64, help="Width of the simulated camera [px].")] = 2048,
-    frames: Annotated[int, typer.Option(min=1, help="Frames averaged in each capture.")] = 50,
+    frames: Annotated[int, typer.Option(min=1, help="Frames averaged in each capture.")] = 100,
 ) -> None:
     """The whole chain on a packaged room: simulate a rig, capture, reconstruct, report."""
     from app.demo import run_demo

@@ -24,6 +24,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, cg
 
+from core.air import Air
 from core.knowledge import KnownTemperature, VertexGrid, known_temperature, plane_on_grid, wall_index
 from core.problem import Problem, ShiftMeasurement
 from core.result import Outcome, Solution
@@ -119,7 +120,7 @@ def solve_temperature(
         )
     # Kelvin to excess refractivity at ambient: only scales weights, never values.
     per_k = air.ambient_refractivity / air.ambient_temperature_k
-    prior = np.asarray(air.excess_refractivity(prior_temperature(problem, grid) - air.ambient_temperature_k))
+    prior = _excess(air, prior_temperature(problem, grid) - air.ambient_temperature_k)
     weights = tuple(data_weight(s, settings.representation) for s in problem.shifts)
     cell = float(np.prod(grid.spacing_m)) / float(np.prod(problem.scene.room.size_m))
     scales = (settings.across_k_m, settings.along_k_m, settings.across_k_m)
@@ -128,7 +129,7 @@ def solve_temperature(
     stiffness = [f * np.prod(grid.shape) / 100 for f in stiffness]
     system = _System(grid, operators, weights, known, per_k, (stiffness[0], stiffness[1], stiffness[2]))
     n, iterations, settled = _minimise(system, problem.shifts, prior, air, settings, on_event)
-    temperature = np.asarray(air.temperature_k(n + air.ambient_refractivity))
+    temperature = air.ambient_refractivity * air.ambient_temperature_k / (n + air.ambient_refractivity)
     x, y, z = grid.axes_m
     return Solution(
         x_m=x,
@@ -158,6 +159,11 @@ def prior_temperature(problem: Problem, grid: VertexGrid) -> Volume:
     return volume
 
 
+def _excess(air: Air, excess_k: np.ndarray) -> np.ndarray:
+    """`Air.excess_refractivity` in float64, whatever JAX is set to."""
+    return -air.ambient_refractivity * excess_k / (air.ambient_temperature_k + excess_k)
+
+
 def data_weight(shift: ShiftMeasurement, representation: float) -> Float[np.ndarray, "windows 2 2"]:
     """Inverse covariance of noise and representation error; zero for windows far outside the rest."""
     size = np.linalg.norm(shift.displacement_px, axis=1)
@@ -174,7 +180,7 @@ def _minimise(
     system: _System,
     shifts: tuple[ShiftMeasurement, ...],
     prior: Volume,
-    air: Any,
+    air: Air,
     settings: TemperatureSettings,
     on_event: OnEvent | None,
 ) -> tuple[Volume, tuple[dict[str, float], ...], bool]:
@@ -184,10 +190,10 @@ def _minimise(
     for operator, weight, shift in zip(system.operators, system.weights, shifts, strict=True):
         rhs += operator.transpose(np.einsum("wab,wb->wa", weight, shift.displacement_px))
     ambient = air.ambient_temperature_k
-    target = np.asarray(air.excess_refractivity(np.where(known.mask, known.temperature_k, ambient) - ambient))
+    target = _excess(air, np.where(known.mask, known.temperature_k, ambient) - ambient)
     rhs[known.mask] += (target / (known.std_k * system.per_k) ** 2)[known.mask]
     for members, kelvin, std in known.means:
-        value = float(air.excess_refractivity(np.float64(kelvin - ambient)))
+        value = float(_excess(air, np.array(kelvin - ambient)))
         rhs.reshape(-1)[members] += value / (len(members) * (std * system.per_k) ** 2)
 
     def hessian(flat: np.ndarray) -> np.ndarray:
@@ -203,7 +209,7 @@ def _minimise(
 
     size = int(np.prod(shape))
     found, info = cg(
-        LinearOperator((size, size), matvec=hessian, dtype=np.float64),
+        _operator(hessian, size),
         rhs.ravel(),
         rtol=settings.tolerance,
         maxiter=settings.max_iterations,
@@ -238,7 +244,7 @@ def _preconditioner(system: _System) -> LinearOperator:
         return np.einsum("xi,iky,zk->xyz", qx, modes, qz, optimize=True).ravel()
 
     size = int(np.prod(shape))
-    return LinearOperator((size, size), matvec=apply, dtype=np.float64)
+    return _operator(apply, size)
 
 
 def _laplacian(n: int) -> Float[np.ndarray, "n n"]:
@@ -246,6 +252,10 @@ def _laplacian(n: int) -> Float[np.ndarray, "n n"]:
     laplacian = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
     laplacian[0, 0] = laplacian[-1, -1] = 1.0
     return laplacian
+
+
+def _operator(product: Callable[[np.ndarray], np.ndarray], size: int) -> LinearOperator:
+    return LinearOperator((size, size), matvec=product, dtype=np.float64)  # type: ignore[call-arg]
 
 
 def _modes(
