@@ -32,6 +32,7 @@ Information = Literal["paper", "operator", "surveyed"]
 
 # The camera sees this much of the wall beyond the room on each side: a border that no flow moves.
 BORDER = 0.03
+BORDER_PX = 36
 # Finest period of a printed pattern, in pattern pixels (half a camera pixel each).
 FINEST_PX = 10.0
 PLANE_FILE = "boundary/plane_x_min.npz"
@@ -141,7 +142,9 @@ def _air(volume: RoomVolume) -> Air:
 def _covering(room: Box, size_px: tuple[int, int], stand_off_m: float, baseline_m: Vector2) -> Optics:
     """Optics at the stand-off whose panel covers the back wall and a border; shifted like a lens, not tilted."""
     centre = room.centre_m
-    width, height = (room.size_m[axis] * (1 + 2 * BORDER) for axis in (0, 2))
+    # Room for two windows beside the wall, and for the gradient's reach at the picture's edge.
+    border = max(BORDER, BORDER_PX / size_px[0])
+    width, height = (room.size_m[axis] * (1 + 2 * border) for axis in (0, 2))
     focal_px = stand_off_m * min(size_px[0] / width, size_px[1] / height)
     position: Vector3 = (
         centre[0] + baseline_m[0],
