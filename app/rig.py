@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float32
 
-from app.errors import BadInputError
+from app.cameras import open_v4l2
 from app.experiment import Experiment
 from app.rig_settings import SimulatedCameraSettings
 from app.room_scene import FINEST_PX
@@ -30,7 +30,7 @@ def open_camera(experiment: Experiment, air: AirState, view: int = 0) -> Camera:
     settings = experiment.settings.rig.camera
     if isinstance(settings, SimulatedCameraSettings):
         return _simulated_camera(experiment, settings, air, view)
-    raise BadInputError(f"No driver for a camera of kind {settings.kind!r}; known: simulated.")
+    return open_v4l2(settings)
 
 
 def _simulated_camera(

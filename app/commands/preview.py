@@ -1,0 +1,39 @@
+"""`airlens preview`: a picture and a quality line, now."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(cli: typer.Typer) -> None:
+    """Add `preview`."""
+    cli.command()(preview)
+
+
+def preview(
+    experiment: Annotated[Path, typer.Argument(help="Experiment folder, whose rig names the camera.")],
+    out: Annotated[Path | None, typer.Option(help="Write the picture here (PNG).")] = None,
+    exposure: Annotated[float | None, typer.Option(help="Exposure time in s.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Take one frame; print its level, contrast, focus and saturation with advice."""
+    from app.experiment import open_experiment
+    from app.quality_line import judge_frame, write_picture
+    from app.rig import open_camera
+
+    with open_camera(open_experiment(experiment), "still") as camera:
+        if exposure is not None:
+            camera.exposure_s = exposure
+        frame = camera.grab()
+        quality = judge_frame(camera, frame)
+        info = camera.info
+    if out is not None:
+        write_picture(out, frame)
+    if as_json:
+        typer.echo(
+            json.dumps({"camera": info.name, "picture": str(out) if out else None} | quality.as_json())
+        )
+        return
+    typer.echo(f"{info.name}, {info.width_px} x {info.height_px}, {info.bits} bit: {quality.line}")
