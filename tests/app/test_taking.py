@@ -58,7 +58,8 @@ def test_a_sequence_is_one_capture_a_burst_with_its_times(experiment):
     taken = take_sequence(camera, experiment, CapturePlan(kind="flow", frames=3, settle_frames=0), (0.0, 0.5))
     times = [load_capture(one.folder).manifest["origin"]["sequence"] for one in taken]
     assert [t["number"] for t in times] == [0, 1]
-    assert times[1]["began_s"] == pytest.approx(0.5, abs=0.4)
+    assert times[1]["due_s"] == 0.5
+    assert times[1]["began_s"] >= 0.5  # how late it may be is up to the machine
     with pytest.raises(DeviceSettingError, match="apart"):
         take_sequence(camera, experiment, CapturePlan(kind="flow", frames=300), (0.0, 0.5))
 

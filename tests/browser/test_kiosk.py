@@ -85,7 +85,7 @@ def browser(url, folder, *options):
 def test_the_screen_equals_the_file_bit_for_bit():
     sent = picture()
     with virtual_screen() as (env, file, folder):
-        screen = KioskScreen(timeout_s=60.0)
+        screen = KioskScreen(timeout_s=120.0)
         with (
             running("matchbox-window-manager", "-use_titlebar", "no", env=env),
             serve_kiosk(screen) as url,
@@ -107,7 +107,7 @@ def test_the_screen_equals_the_file_bit_for_bit():
 
 def test_a_window_that_is_not_full_screen_refuses_and_says_which_size_is_wanted():
     with virtual_screen() as (env, _, folder):
-        screen = KioskScreen(timeout_s=60.0)
+        screen = KioskScreen(timeout_s=120.0)
         with (
             serve_kiosk(screen) as url,
             running(*browser(f"--app={url}", folder, "--window-size=900,700"), env=env),

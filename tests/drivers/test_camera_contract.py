@@ -7,7 +7,6 @@ import pytest
 
 from drivers.burst import BurstOutcome, CapturePlan
 from drivers.capture import run_capture
-from drivers.clock import SystemClock
 from drivers.protocols import Camera
 from drivers.simulated import SimulatedCamera
 from drivers.v4l2 import V4l2Camera, V4l2Request, list_devices
@@ -26,9 +25,7 @@ def open_hardware(device):
 def camera(request):
     if request.param == "twin":
         view = pattern()
-        opened = SimulatedCamera(
-            lambda: view, seed=1, frame_rate_hz=100.0, exposure_s=0.005, clock=SystemClock()
-        )
+        opened = SimulatedCamera(lambda: view, seed=1)
     else:
         device = request.config.getoption("--camera")
         if device is None:

@@ -41,6 +41,16 @@ def refused(action, *kinds):
     raise RuntimeError(f"expected {kinds}")
 
 
+def good(action):
+    """Return the next good frame: a slow machine loses some, and each is refused as it should be."""
+    for _ in range(100):
+        try:
+            return action()
+        except FrameError:
+            continue
+    raise RuntimeError("a hundred frames refused in a row")
+
+
 def enumerates():
     found = {d.path: d for d in list_devices()}[DEVICE]
     codes = [f.code for f in found.formats]
@@ -68,7 +78,7 @@ def captures_exact_types():
     ):
         try:
             with V4l2Camera(request(code)) as camera:
-                frames = [camera.grab(), camera.follow()]
+                frames = [good(camera.grab), good(camera.follow)]
         except DeviceSettingError as error:
             found[code] = str(error)
             continue
@@ -86,7 +96,7 @@ def grey_is_the_top_byte_of_y16():
     rows = {}
     for code in ("GREY", "Y16", "YUYV"):
         with V4l2Camera(request(code)) as camera:
-            rows[code] = camera.grab().pixels[SIZE[1] // 2]
+            rows[code] = good(camera.grab).pixels[SIZE[1] // 2]
     high = (rows["Y16"] >> 8).astype(np.uint8)
     return {
         "grey_equals_y16_high_byte": bool(np.array_equal(rows["GREY"], high)),
@@ -123,16 +133,16 @@ def gain_without_automatic():
 
 def in_use_is_said():
     with V4l2Camera(request()) as camera:
-        camera.grab()
+        good(camera.grab)
         return refused(lambda: V4l2Camera(request()), DeviceBusyError)
 
 
 def fresh_after_idle():
     with V4l2Camera(request()) as camera:
-        camera.follow()
+        good(camera.follow)
         time.sleep(2.0)
         called_s = time.monotonic()
-        frame = camera.grab()
+        frame = good(camera.grab)
         stale = dict(camera.gate.refused)
     assert frame.timestamp_s - 1 / 25 >= called_s - 0.05
     return {"stale dropped": stale, "age_s": round(called_s - frame.timestamp_s, 3)}
@@ -162,7 +172,7 @@ def sees_the_error_flag():
     seen = 0
     with V4l2Camera(request()) as camera:
         for _ in range(5):
-            camera.follow()
+            good(camera.grab)
             camera.controls.press("inject_v4l2_buf_flag_error")
             for _ in range(6):
                 try:
@@ -177,7 +187,7 @@ def burst_through_drops():
     with V4l2Camera(request("Y16")) as camera:
         control = camera.controls.named("percentage_of_dropped_buffers")
         camera.controls.set(control.identifier, 20)
-        burst = run_capture(camera, CapturePlan(frames=25, settle_frames=0))
+        burst = run_capture(camera, CapturePlan(frames=25, settle_frames=0, max_refused=1000))
         camera.controls.set(control.identifier, 0)
     assert burst.outcome is BurstOutcome.COMPLETE
     assert burst.frames == 25
@@ -188,7 +198,7 @@ def a_stall_ends_in_our_own_time():
     """All buffers are dropped: the driver runs, and nothing arrives."""
     with V4l2Camera(request()) as camera:
         control = camera.controls.named("percentage_of_dropped_buffers")
-        camera.grab()
+        good(camera.grab)
         camera.controls.set(control.identifier, 100)
         time.sleep(0.5)
         began_s = time.monotonic()
@@ -203,7 +213,7 @@ def a_stall_ends_in_our_own_time():
                 began_s = time.monotonic()
         took_s = time.monotonic() - began_s
         camera.controls.set(control.identifier, 0)
-        frame = camera.grab()
+        frame = good(camera.grab)
     assert text
     assert took_s < 2.0, took_s
     return {"took_s": round(took_s, 2), "says": text, "then a good frame": frame.sequence}
@@ -211,7 +221,7 @@ def a_stall_ends_in_our_own_time():
 
 def recovers_from_a_fatal_error():
     with V4l2Camera(request()) as camera:
-        camera.grab()
+        good(camera.grab)
         camera.controls.press("inject_fatal_streaming_error")
         began_s = time.monotonic()
         text = ""
@@ -224,7 +234,7 @@ def recovers_from_a_fatal_error():
                     break
         took_s = time.monotonic() - began_s
         camera.reconnect()
-        frame = camera.grab()
+        frame = good(camera.grab)
     return {"noticed_s": round(took_s, 2), "says": text, "then": frame.pixels.shape}
 
 
@@ -249,7 +259,7 @@ def sequence_wraps():
 
 def notices_a_disconnect():
     with V4l2Camera(request()) as camera:
-        camera.grab()
+        good(camera.grab)
         began_s = time.monotonic()
         timer = threading.Timer(0.3, lambda: camera.controls.press("disconnect"))
         timer.start()
