@@ -143,6 +143,30 @@ class PointLoss(eqx.Module):
         return _errors(fields.at(self.points_nd), self.target, self.weight)
 
 
+class SmoothnessLoss(eqx.Module):
+    """Mean square slope of T's departure from `expected`, over the slopes that a room has.
+
+    Images see integrals along y only: across the view slopes may be large, along it they are believed to
+    be small. `slopes` are in nondimensional units along x, y, z.
+    """
+
+    spans: Spans = eqx.field(static=True)
+    expected: Float[Array, "nx ny nz"]
+    slopes: tuple[float, float, float] = eqx.field(static=True)
+    weight: float = eqx.field(static=True)
+    name: str = eqx.field(static=True, default="smoothness")
+
+    def rows(self, fields: Fields, unknowns: Unknowns, key: PRNGKeyArray | None) -> Rows:
+        """Differences between neighbouring vertices."""
+        departure = fields.on_grid(self.spans).temperature - self.expected
+        rows = []
+        for axis, (span, slope) in enumerate(zip(self.spans, self.slopes, strict=True)):
+            step = (span[1] - span[0]) / (span[2] - 1)
+            difference = jnp.diff(departure, axis=axis)
+            rows.append((self.weight / difference.size) ** 0.5 / (step * slope) * difference)
+        return tuple(rows)
+
+
 class PriorLoss(eqx.Module):
     """What is believed before measuring: drift and learned transport are near zero, one sigma each."""
 

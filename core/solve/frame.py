@@ -2,10 +2,13 @@
 
 from typing import NamedTuple
 
-from core.boussinesq import Numbers, Scales, scales
+import jax.numpy as jnp
+import numpy as np
+
+from core.boussinesq import Flow, Numbers, Scales, scales
 from core.geometry import Box
 from core.problem import Problem
-from core.representation import Spans
+from core.representation import Spans, positions
 from core.scene import FlowModel, Heater, Inlet, Wall
 from core.setting import SettingError
 
@@ -56,6 +59,23 @@ def frame_of(problem: Problem) -> Frame:
     )
     x, y, z = (size / found.length_m for size in room.size_m)
     return Frame(room, found, _numbers(scene.flow, problem, found), (x, y, z))
+
+
+def height_profile(problem: Problem, frame: Frame, spans: Spans) -> Flow:
+    """Median over y of T and p on a known plane across x or y, carried through the room; zero without one."""
+    shape = tuple(span[2] for span in spans)
+    temperature = np.zeros(shape, np.float32)
+    pressure = np.zeros(shape, np.float32)
+    upright = [plane for plane in problem.planes if plane.wall[0] in "xy"]
+    if upright:
+        plane, scales = upright[0], frame.scales
+        z_m = frame.room.lower_m[2] + scales.length_m * positions(spans[2])
+        excess = np.median(plane.temperature_k, axis=0) - scales.reference_k
+        temperature += np.interp(z_m, plane.second_m, excess / scales.excess_k)
+        pressure += (
+            np.interp(z_m, plane.second_m, np.median(plane.pressure_m2_s2, axis=0)) / scales.pressure_m2_s2
+        )
+    return Flow(jnp.asarray(temperature), jnp.asarray(pressure), jnp.zeros((*shape, 3)))
 
 
 def _numbers(flow: FlowModel, problem: Problem, found: Scales) -> Numbers:

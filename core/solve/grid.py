@@ -11,16 +11,15 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from core.boussinesq import Flow
 from core.grid.multiresolution import MultiGrid, zero_multigrid
 from core.grid.staggered import StaggeredGrid
 from core.losses import Loss, all_rows
 from core.problem import Problem
-from core.representation import Spans, Unknowns, positions
+from core.representation import Unknowns, positions
 from core.result import Outcome, Solution
 from core.setting import SettingError, setting
 from core.solve.check import check_problem
-from core.solve.frame import Frame, frame_of
+from core.solve.frame import Frame, frame_of, height_profile
 from core.solve.gauss_newton import Step, gauss_newton_step
 from core.solve.regime import DataModel, Regime, Weights, losses_of
 from core.solve.solution import solution_of
@@ -52,7 +51,12 @@ class GridSettings:
             )
 
 
-def solve_grid(problem: Problem, settings: GridSettings, *, on_event: OnEvent | None = None) -> Solution:
+def solve_grid(
+    problem: Problem,
+    settings: GridSettings,
+    *,
+    on_event: OnEvent | None = None,
+) -> Solution:
     """T, p, u on vertices, `cells` + 1 an axis. Raises SettingError for a problem that cannot be solved."""
     check_problem(problem, settings.regime)
     started = time.perf_counter()
@@ -103,23 +107,6 @@ def _multigrid(unknowns: Unknowns) -> MultiGrid:
     if not isinstance(unknowns.representation, MultiGrid):
         raise TypeError(f"the grid solver was given {type(unknowns.representation).__name__}")
     return unknowns.representation
-
-
-def height_profile(problem: Problem, frame: Frame, spans: Spans) -> Flow:
-    """Median over y of T and p on a known plane across x or y, carried through the room; zero without one."""
-    shape = tuple(span[2] for span in spans)
-    temperature = np.zeros(shape, np.float32)
-    pressure = np.zeros(shape, np.float32)
-    upright = [plane for plane in problem.planes if plane.wall[0] in "xy"]
-    if upright:
-        plane, scales = upright[0], frame.scales
-        z_m = frame.room.lower_m[2] + scales.length_m * positions(spans[2])
-        excess = np.median(plane.temperature_k, axis=0) - scales.reference_k
-        temperature += np.interp(z_m, plane.second_m, excess / scales.excess_k)
-        pressure += (
-            np.interp(z_m, plane.second_m, np.median(plane.pressure_m2_s2, axis=0)) / scales.pressure_m2_s2
-        )
-    return Flow(jnp.asarray(temperature), jnp.asarray(pressure), jnp.zeros((*shape, 3)))
 
 
 def _rows(unknowns: Unknowns, losses: tuple[Loss, ...]):

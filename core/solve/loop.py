@@ -86,8 +86,11 @@ def run(
     on_event: OnEvent | None = None,
     store: CheckpointStore | None = None,
     should_stop: Callable[[], bool] | None = None,
+    watch: Callable[[PyTree, float], object] | None = None,
 ) -> LoopResult:
     """Minimise `objective(unknowns, data, key)` over the inexact arrays of `unknowns`.
+
+    `watch(unknowns, elapsed_s)` is called at every record; its own time is the caller's to leave out.
 
     Raises SettingError if the step needs more memory than `memory_limit_bytes`, or if a checkpoint does
     not belong to this configuration.
@@ -119,6 +122,8 @@ def run(
         if due or not bool(state.finite):
             history.append(_record(state, parts, time.perf_counter() - began))
             tell({"kind": "progress", "steps": settings.steps, **history[-1]})
+            if watch is not None:
+                watch(state.unknowns, history[-1]["elapsed_s"])
         outcome = _ended(state, settings, began, should_stop)
         if keeper.save_if_due(state, history, final=outcome is Outcome.stopped):
             tell({"kind": "checkpoint", "step": number})

@@ -5,6 +5,7 @@ the recipe as published; the network's size, the learning rate and the weights a
 settings here.
 """
 
+import dataclasses
 import time
 from collections.abc import Callable
 from typing import Any, Literal
@@ -17,7 +18,7 @@ from core.losses import BoundaryLoss, Loss, PhysicsLoss, total
 from core.mlp import MlpSettings, initial_mlp
 from core.problem import Problem
 from core.representation import Unknowns
-from core.result import Solution
+from core.result import Outcome, Solution
 from core.setting import setting
 from core.shift_loss import ShiftLoss
 from core.solve.check import check_problem
@@ -61,6 +62,7 @@ def solve_mlp(
     on_event: OnEvent | None = None,
     store: CheckpointStore | None = None,
     should_stop: Callable[[], bool] | None = None,
+    watch: Callable[[Solution], object] | None = None,
 ) -> Solution:
     """T, p, u on `result_vertices` vertices an axis. Raises SettingError before the first iteration."""
     check_problem(problem, settings.regime)
@@ -71,18 +73,24 @@ def solve_mlp(
         problem, frame, settings.regime, settings.weights, settings.data, (n, n, n), settings.wall_points
     )
     losses = tuple(_with_batches(loss, settings) for loss in losses)
+    r = settings.result_vertices
+
+    def show(unknowns: Unknowns, elapsed_s: float) -> None:
+        if watch is not None:
+            watch(solution_of(unknowns, frame, (r, r, r), Outcome.step_limit, elapsed_s, ()))
+
     found = run(
         _objective,
         initial_unknowns(problem, settings, frame.lower, frame.upper),
         losses,
         _optimiser(settings),
         settings.loop,
-        configuration=configuration_hash(settings, problem.scene),
+        configuration=configuration_hash(_lasting(settings), problem.scene),
         on_event=on_event,
         store=store,
         should_stop=should_stop,
+        watch=show,
     )
-    r = settings.result_vertices
     notes = (
         f"{settings.network.hidden_layers} x {settings.network.width} {settings.network.activation} network; "
         f"a step needs {found.memory_bytes / 1e6:.0f} MB; compiled in {found.compile_s:.1f} s.",
@@ -106,6 +114,12 @@ def initial_unknowns(
         jnp.zeros((len(problem.shifts), 4)) if drifts else None,
         jnp.zeros(2) if learned else None,
     )
+
+
+def _lasting(settings: MlpSolveSettings) -> MlpSolveSettings:
+    """Without what a resumed run may change: when to end, report and keep."""
+    kept = LoopSettings(seed=settings.loop.seed)
+    return dataclasses.replace(settings, loop=kept)
 
 
 def _objective(unknowns: Unknowns, losses: tuple[Loss, ...], key: jax.Array):

@@ -2,17 +2,25 @@
 
 from typing import Literal
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Bool, Float
 
 from core.boundary import boundary_loss, point_losses
-from core.losses import Loss, PhysicsLoss, PriorLoss
+from core.image_rows import rendered_rows, warped_rows
+from core.losses import Loss, PhysicsLoss, PriorLoss, SmoothnessLoss
 from core.problem import Problem, ShiftMeasurement
 from core.rays.operator import build
+from core.rays.optics import pinhole
+from core.scene import Scene
 from core.setting import SettingError, setting
-from core.shift_loss import ShiftLoss, displacement_rows, similarity_basis
-from core.solve.frame import Frame
+from core.shift_loss import ShiftLoss, ShiftRows, displacement_rows, similarity_basis
+from core.solve.frame import Frame, height_profile
 
 Regime = Literal["bos+boundary", "pde+boundary", "bos+pde+boundary"]
+# Slopes of room air that a smoothness belief allows, as in the `draft` preset.
+_ACROSS_K_M, _ALONG_K_M = 30.0, 1.0
 REGIMES: tuple[Regime, ...] = ("bos+boundary", "pde+boundary", "bos+pde+boundary")
 
 
@@ -22,13 +30,15 @@ class Weights:
 
     Each loss is a mean of squares: of errors over the noise, of errors over the largest boundary value,
     of dimensionless residuals. λ is therefore one over the mean square at which a term is satisfied:
-    one sigma of noise, about a hundredth of the boundary values, a few hundredths of U²/L.
+    one sigma of noise, about a hundredth of the boundary values, a few hundredths of U²/L. `smoothness`
+    is a belief about slopes of T (30 K/m across the view, 1 K/m along it), a hundredth of the images' say.
     """
 
     bos: float = 1.0
     boundary: float = 1e4
     pde: float = 1e3
     gamma: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    smoothness: float = 0.015
 
 
 @setting
@@ -37,18 +47,20 @@ class DataModel:
 
     `representation` is the part of the shifts' size that the model's grid cannot hold, added to the
     noise. Windows whose shift is `outlier` times the typical one (a thermal layer beside a wall, thinner
-    than a cell) are left out. `drift_std_px` is None where the images are known to be still.
+    than a cell) are left out, and so are those within `margin` of the room's size from a side wall, floor
+    or ceiling. `drift_std_px` is None where the images are known to be still.
     """
 
-    representation: float = 0.05
+    representation: float = 0.1
     outlier: float = 6.0
+    margin: float = 0.05
     drift_std_px: float | None = None
 
 
 def losses_of(
     problem: Problem,
     frame: Frame,
-    regime: Regime,
+    regime: str,
     weights: Weights,
     data: DataModel,
     shape: tuple[int, int, int],
@@ -60,6 +72,8 @@ def losses_of(
     losses: list[Loss] = []
     if "bos" in regime:
         losses.append(image_loss(problem, frame, weights.bos, data, shape))
+        if weights.smoothness > 0:
+            losses.append(_smoothness(problem, frame, weights.smoothness, shape))
     boundary = boundary_loss(problem, frame, weight=weights.boundary, points_an_axis=wall_points)
     if boundary.patches:
         losses.append(boundary)
@@ -71,24 +85,48 @@ def losses_of(
     return tuple(losses)
 
 
+def _smoothness(problem: Problem, frame: Frame, weight: float, shape: tuple[int, int, int]) -> SmoothnessLoss:
+    spans = frame.vertices(shape)
+    per_nd = frame.scales.length_m / abs(frame.scales.excess_k)
+    across, along = _ACROSS_K_M * per_nd, _ALONG_K_M * per_nd
+    return SmoothnessLoss(
+        spans, height_profile(problem, frame, spans).temperature, (across, along, across), weight
+    )
+
+
 def image_loss(
     problem: Problem, frame: Frame, weight: float, data: DataModel, shape: tuple[int, int, int]
 ) -> ShiftLoss:
-    """The displacement data term of every view."""
-    views = []
-    for view, shift in enumerate(problem.shifts):
-        camera = problem.scene.views[view].camera
-        used, model_std_px = _usable(shift, data)
-        kept = type(shift)(
-            shift.centres_px[used],
-            shift.displacement_px[used],
-            shift.information_per_px2[used],
-            shift.window_px,
+    """The data term of every view, as the scene names it; `auto` takes the windows' displacements."""
+    scene = problem.scene
+    match scene.solve.data_term:
+        case "rendered":
+            views = [rendered_rows(scene, v, pair, shape) for v, pair in enumerate(problem.images)]
+        case "warped":
+            views = [warped_rows(scene, v, pair, shape) for v, pair in enumerate(problem.images)]
+        case _:
+            views = [_windows(problem, v, data, shape) for v in range(len(problem.shifts))]
+    return ShiftLoss(tuple(views), frame.vertices(shape), frame.scales, scene.air, weight)
+
+
+def _windows(problem: Problem, view: int, data: DataModel, shape: tuple[int, int, int]) -> ShiftRows:
+    shift, camera = problem.shifts[view], problem.scene.views[view].camera
+    used, model_std_px = _usable(shift, data)
+    used &= _away_from_walls(problem.scene, view, shift.centres_px, data.margin)
+    if not used.any():
+        raise SettingError(
+            f"View {problem.scene.views[view].name!r} sees nothing of the room away from its walls. "
+            "Check that the back wall is inside the picture."
         )
-        operator = build(problem.scene, view, kept.centres_px, shape, window_px=float(kept.window_px))
-        basis = similarity_basis(kept.centres_px, (camera.width_px, camera.height_px))
-        views.append(displacement_rows(kept, operator, basis, model_std_px))
-    return ShiftLoss(tuple(views), frame.vertices(shape), frame.scales, problem.scene.air, weight)
+    kept = ShiftMeasurement(
+        shift.centres_px[used],
+        shift.displacement_px[used],
+        shift.information_per_px2[used],
+        shift.window_px,
+    )
+    operator = build(problem.scene, view, kept.centres_px, shape, window_px=float(kept.window_px))
+    basis = similarity_basis(kept.centres_px, (camera.width_px, camera.height_px))
+    return displacement_rows(kept, operator, basis, model_std_px)
 
 
 def _usable(shift: ShiftMeasurement, data: DataModel) -> tuple[np.ndarray, float]:
@@ -100,3 +138,20 @@ def _usable(shift: ShiftMeasurement, data: DataModel) -> tuple[np.ndarray, float
     seen = size[textured]
     typical = float(np.sqrt(np.mean(np.minimum(seen, np.percentile(seen, 90)) ** 2)))
     return textured & (size < data.outlier * typical + 6 * noise), data.representation * typical
+
+
+def _away_from_walls(
+    scene: Scene, view: int, centres_px: Float[np.ndarray, "windows 2"], margin: float
+) -> Bool[np.ndarray, " windows"]:
+    """Whether a window's place on the back wall is further than `margin` from the wall's edges."""
+    lens, room = scene.views[view].camera, scene.room
+    directions = np.asarray(
+        jax.vmap(pinhole(lens).direction)(jnp.asarray(centres_px, jnp.float32)), np.float64
+    )
+    reach = (room.upper_m[1] - lens.position_m[1]) / np.maximum(directions[:, 1], 1e-9)
+    points = np.array(lens.position_m) + reach[:, None] * directions
+    inside = np.ones(len(centres_px), bool)
+    for axis in (0, 2):
+        gap = margin * room.size_m[axis]
+        inside &= (points[:, axis] > room.lower_m[axis] + gap) & (points[:, axis] < room.upper_m[axis] - gap)
+    return inside

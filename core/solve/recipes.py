@@ -1,0 +1,37 @@
+"""Named ways to solve with the grid and the network; what each cost and bought is in README."""
+
+from collections.abc import Callable
+from typing import Any
+
+from core.mlp import MlpSettings
+from core.problem import Problem
+from core.result import Solution
+from core.solve.grid import GridSettings, solve_grid
+from core.solve.loop import LoopSettings
+from core.solve.mlp import MlpSolveSettings, solve_mlp
+from core.solve.regime import Regime
+
+OnEvent = Callable[[dict[str, Any]], object]
+
+
+def regime_for(problem: Problem) -> Regime:
+    """All three losses where there are images, without the image loss where there are none."""
+    return "bos+pde+boundary" if problem.shifts or problem.images else "pde+boundary"
+
+
+def solve_grid_recipe(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+    """All losses on the grid; `scene.solve.grid` cells an axis, 32 by default."""
+    chosen = problem.scene.solve.grid
+    cells = 32 if chosen == "auto" else chosen
+    settings = GridSettings(regime=regime_for(problem), cells=cells, coarsest=min(cells, 32))
+    return solve_grid(problem, settings, on_event=on_event)
+
+
+def solve_paper(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+    """The paper's recipe: AdaBelief, 80,000 iterations, batches of 8192, 5000 and 4096, 64 vertices."""
+    settings = MlpSolveSettings(
+        regime=regime_for(problem),
+        network=MlpSettings(hidden_layers=4, width=128),
+        loop=LoopSettings(steps=80_000, patience=80_000),
+    )
+    return solve_mlp(problem, settings, on_event=on_event)
