@@ -7,6 +7,7 @@ from app.errors import BadInputError
 from core.problem import Problem
 from core.result import Solution
 from core.solve.draft import solve_draft
+from core.solve.recipes import solve_grid_recipe, solve_paper
 
 OnEvent = Callable[[dict[str, Any]], object]
 
@@ -19,7 +20,11 @@ class Solve(Protocol):
         ...
 
 
-PRESETS: Mapping[str, Solve] = {"draft": solve_draft}
+PRESETS: Mapping[str, Solve] = {
+    "draft": solve_draft,
+    "grid": solve_grid_recipe,
+    "paper": solve_paper,
+}
 
 
 def preset(name: str) -> Solve:
