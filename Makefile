@@ -3,7 +3,7 @@ BIN := .venv/bin
 UV := $(BIN)/uv pip
 CORES := $(shell nproc 2>/dev/null || echo 2)
 
-.PHONY: demo test check format bench lock setup
+.PHONY: demo test chromium check format bench lock setup
 setup: .venv/.installed
 
 .venv/.installed: requirements.lock pyproject.toml
@@ -16,8 +16,14 @@ setup: .venv/.installed
 demo: setup
 	$(BIN)/airlens demo
 
-test: setup
+test: setup chromium
 	$(BIN)/python -m pytest -n $(CORES) --dist loadscope
+
+# Debian's browser for the tests of the page; where it cannot be installed they are skipped and say so.
+chromium:
+	@command -v chromium >/dev/null || { [ "$$(id -u)" = 0 ] && apt-get update -qq \
+	  && apt-get install -y -qq --no-install-recommends chromium fonts-dejavu-core; } >/dev/null 2>&1 \
+	  || echo "No chromium here: the browser tests will be skipped."
 
 check: setup
 	$(BIN)/ruff format --check .

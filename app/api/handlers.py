@@ -12,6 +12,8 @@ from starlette.exceptions import HTTPException
 from app.api.headers import headers_for
 from app.api.problems import MEDIA_TYPE, ApiError, FieldError, body_of
 from app.errors import AirlensError, BadInputError
+from app.jobs import EngineError, JobError, LedgerError, UnknownJobError
+from calibration.errors import CalibrationError
 from core.setting import SettingError
 from drivers.errors import DeviceBusyError, DeviceError, DeviceNotFoundError
 
@@ -30,8 +32,13 @@ def add_handlers(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _validation)
     app.add_exception_handler(BadInputError, _bad_input)
     app.add_exception_handler(SettingError, _bad_input)
+    app.add_exception_handler(CalibrationError, _bad_input)
     app.add_exception_handler(DeviceError, _device)
     app.add_exception_handler(AirlensError, _failed)
+    app.add_exception_handler(UnknownJobError, _unknown_job)
+    app.add_exception_handler(JobError, _conflict)
+    app.add_exception_handler(LedgerError, _unavailable)
+    app.add_exception_handler(EngineError, _unavailable)
     app.add_exception_handler(OSError, _os)
     app.add_exception_handler(Exception, _internal)
 
@@ -70,6 +77,18 @@ def _bad_input(_request: Request, error: Exception) -> Response:
 
 def _failed(_request: Request, error: Exception) -> Response:
     return respond(ApiError("failed", str(error)))
+
+
+def _unknown_job(_request: Request, error: Exception) -> Response:
+    return respond(ApiError("not_found", str(error)))
+
+
+def _conflict(_request: Request, error: Exception) -> Response:
+    return respond(ApiError("conflict", str(error)))
+
+
+def _unavailable(_request: Request, error: Exception) -> Response:
+    return respond(ApiError("unavailable", str(error)))
 
 
 def _device(_request: Request, error: Exception) -> Response:

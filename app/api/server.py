@@ -50,6 +50,8 @@ def server_of(app: FastAPI, tls: Tls | None = None) -> uvicorn.Server:
             log_level="warning",
             timeout_graceful_shutdown=2,
             ws_max_size=4096,
+            # JPEG does not shrink; trying to would cost more than everything else of a frame.
+            ws_per_message_deflate=False,
             ssl_certfile=tls.certificate if tls else None,
             ssl_keyfile=tls.key if tls else None,
         )

@@ -7,8 +7,16 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from app.api.access import Access
+from app.api.curves import CurveCache
+from app.api.feed import EventFeed
+from app.api.folders import Folders
 from app.api.settings import ServiceConfig
-from app.uploads.store import UploadStore
+from app.api.volumes import SolutionCache
+from app.desk import CaptureDesk
+from app.jobs import Ledger
+from app.kiosk_screen import KioskScreen
+from app.live import LiveCamera
+from app.uploads.store import UploadLimits, UploadStore
 
 
 @dataclass(frozen=True)
@@ -18,6 +26,41 @@ class Services:
     config: ServiceConfig
     access: Access
     uploads: UploadStore
+    folders: Folders
+    ledger: Ledger
+    feed: EventFeed
+    curves: CurveCache
+    solutions: SolutionCache
+    camera: LiveCamera
+    desk: CaptureDesk
+    screen: KioskScreen
+
+
+def create_services(config: ServiceConfig) -> Services:
+    """Build the services of one configuration."""
+    limits = config.limits
+    uploads = UploadLimits(
+        pixels=limits.image_pixels,
+        unpacked_bytes=limits.unpacked_bytes,
+        parse_s=limits.parse_s,
+        parse_memory_bytes=limits.parse_memory_bytes,
+        stored=limits.stored_uploads,
+    )
+    ledger = Ledger(config.jobs_folder)
+    camera = LiveCamera(ledger.append_event)
+    return Services(
+        config,
+        Access(config),
+        UploadStore(config.data_root / "uploads", uploads),
+        Folders(config.data_root),
+        ledger,
+        EventFeed(ledger),
+        CurveCache(ledger),
+        SolutionCache(),
+        camera,
+        CaptureDesk(camera, ledger.append_event),
+        KioskScreen(),
+    )
 
 
 def services_of(connection: HTTPConnection) -> Services:

@@ -26,6 +26,13 @@ class Limits:
     streams: int = 64
 
 
+def built_page() -> Path:
+    """Return where the page is: inside an installed wheel, or beside the sources."""
+    package = Path(__file__).resolve().parents[1]
+    installed = package / "page"
+    return installed if installed.is_dir() else package.parent / "web" / "dist"
+
+
 @dataclass(frozen=True)
 class ServiceConfig:
     """A service. `hosts` and `origins` are compared whole, never by prefix or pattern."""
@@ -34,7 +41,7 @@ class ServiceConfig:
     token: str = field(repr=False)
     hosts: frozenset[str]
     origins: frozenset[str]
-    page_folder: Path = Path(__file__).resolve().parents[2] / "web" / "dist"
+    page_folder: Path = field(default_factory=built_page)
     cookie_name: str = "airlens"
     secure_cookie: bool = False
     limits: Limits = Limits()
@@ -45,6 +52,11 @@ class ServiceConfig:
                 f"The token has {len(self.token)} characters; expected at least 32 random ones. "
                 "Leave it out, and the service makes one."
             )
+
+    @property
+    def jobs_folder(self) -> Path:
+        """The ledger and its jobs."""
+        return self.data_root / "jobs"
 
 
 def new_token() -> str:

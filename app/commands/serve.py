@@ -12,6 +12,7 @@ from app.api.server import Tls, listen, server_of
 from app.api.settings import LOOPBACK, service_config
 from app.api.token import service_token
 from app.errors import BadInputError
+from app.jobs import attended
 
 
 def register(cli: typer.Typer) -> None:
@@ -49,7 +50,8 @@ def serve(
     address = f"{base.rstrip('/')}/#token={token}"
     typer.echo(json.dumps({"address": address, "port": port, "data": str(root)}) if as_json else address)
     logging.getLogger("airlens").setLevel(logging.INFO)
-    server.run(sockets=[bound])
+    with attended(config.jobs_folder):
+        server.run(sockets=[bound])
 
 
 def _tls(certificate: Path | None, key: Path | None) -> Tls | None:

@@ -6,6 +6,7 @@ import json
 import os
 import secrets
 import shutil
+import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator
@@ -83,7 +84,7 @@ class UploadStore:
         limits = self._limits
         await asyncio.to_thread(declared_arrays, original, kind, limits.pixels, limits.unpacked_bytes)
         async with self._children:
-            arrays = await read_in_child(kind, original, hidden, limits)
+            arrays = await asyncio.to_thread(read_in_child, kind, original, hidden, limits)
         original.unlink()
         return {
             "kind": kind,
@@ -107,29 +108,28 @@ class UploadStore:
         return kind or check_head(head, self._limits.pixels), size_bytes, digest.hexdigest()
 
 
-async def read_in_child(kind: Kind, source: Path, folder: Path, limits: UploadLimits) -> list[dict[str, Any]]:
+def read_in_child(kind: Kind, source: Path, folder: Path, limits: UploadLimits) -> list[dict[str, Any]]:
     """Return what the child found; BadInputError if it refused, was killed, or took too long."""
-    command = [kind, str(source), str(folder), str(limits.parse_memory_bytes), str(int(limits.parse_s) + 1)]
-    child = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-I", "-m", "app.uploads.child", *command),
-        stdin=asyncio.subprocess.DEVNULL,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.DEVNULL,
-        env={"PATH": os.defpath, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
-    )
+    arguments = [kind, str(source), str(folder), str(limits.parse_memory_bytes), str(int(limits.parse_s) + 1)]
     try:
-        output, _ = await asyncio.wait_for(child.communicate(), limits.parse_s)
-    except TimeoutError as error:
+        # From a thread, not by the event loop: uvloop forks this process, whose other threads may hold locks.
+        done = subprocess.run(
+            [sys.executable, "-I", "-m", "app.uploads.child", *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={"PATH": os.defpath, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+            timeout=limits.parse_s,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
         raise BadInputError(
             f"The file was not read within {limits.parse_s:g} s. Send a smaller one."
         ) from error
-    finally:
-        if child.returncode is None:
-            child.kill()
-            await child.wait()
-    if child.returncode == 0:
-        return json.loads(output)["arrays"]
-    reason = json.loads(output)["reason"] if output else "it needs more memory or time than is allowed"
+    if done.returncode == 0:
+        return json.loads(done.stdout)["arrays"]
+    refused = json.loads(done.stdout)["reason"] if done.stdout else None
+    reason = refused or "it needs more memory or time than is allowed"
     raise BadInputError(f"The file cannot be read: {reason}. Check it in the program that wrote it.")
 
 

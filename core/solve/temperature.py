@@ -18,7 +18,7 @@ is not on a known plane stays unseen.
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -34,6 +34,7 @@ Volume = Float[np.ndarray, "nx ny nz"]
 OnEvent = Callable[[dict[str, Any]], object]
 
 
+@runtime_checkable
 class ShiftOperator(Protocol):
     """The linear map from excess refractivity on vertices to displacements, and its transpose."""
 

@@ -9,7 +9,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 from fastapi.routing import APIRoute, APIWebSocketRoute
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.routing import Route, WebSocketRoute
 
 from app.api import Limits, create_app
 from app.api.settings import service_config
@@ -24,18 +24,17 @@ NO_LIMITS = Limits(reads_per_s=1e9, writes_per_s=1e9, failures_per_s=1e9)
 
 def routes_of(app: FastAPI) -> Iterator[tuple[str, str, str]]:
     """(kind, method, path) of every address that the app answers, WebSockets and files included."""
-    pending = list(app.routes)
+    pending = [("", route) for route in app.routes]
     while pending:
-        route = pending.pop()
+        prefix, route = pending.pop()
         if isinstance(route, APIWebSocketRoute | WebSocketRoute):
-            yield "websocket", "GET", filled(route.path)
+            yield "websocket", "GET", filled(prefix + route.path)
         elif isinstance(route, APIRoute | Route):
             for method in sorted(route.methods or {"GET"}):
-                yield "http", method, filled(route.path)
-        elif isinstance(route, Mount):
-            yield "http", "GET", f"{route.path}/index-1234.js"
+                yield "http", method, filled(prefix + route.path)
         else:
-            pending.extend(getattr(route, "routes", None) or route.original_router.routes)
+            included = route.include_context
+            pending.extend((prefix + included.prefix, inner) for inner in route.original_router.routes)
 
 
 def filled(path: str) -> str:
@@ -68,10 +67,14 @@ def ask(
     if kind == "websocket":
         del scope["method"]
     answer: list[dict[str, Any]] = []
+    asked: list[bool] = []
 
     async def receive() -> dict[str, Any]:
         if kind == "websocket":
             return {"type": "websocket.connect" if not answer else "websocket.disconnect", "code": 1000}
+        if asked:
+            return {"type": "http.disconnect"}
+        asked.append(True)
         return {"type": "http.request", "body": b"", "more_body": False}
 
     async def send(message: Any) -> None:
@@ -80,6 +83,7 @@ def ask(
     asyncio.run(app(scope, receive, send))
     if answer[0]["type"] == "websocket.accept":
         return 101, b""
+    assert answer, (kind, method, path)
     return answer[0]["status"], b"".join(m.get("body", b"") for m in answer)
 
 
@@ -124,10 +128,21 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
     return create_app(service_config(root, TOKEN, PORT, limits=NO_LIMITS))
 
 
+def test_the_iteration_finds_every_described_route_and_the_live_picture(guarded: FastAPI):
+    described = {
+        ("http", method.upper(), filled(path))
+        for path, item in guarded.openapi()["paths"].items()
+        for method in item
+    }
+    found = set(routes_of(guarded))
+    assert described <= found
+    assert ("websocket", "GET", "/api/devices/camera/live") in found
+
+
 def test_no_hostile_header_set_is_accepted_on_any_route(guarded: FastAPI):
     sets, routes = hostile_sets(), list(routes_of(guarded))
     assert len(sets) >= 40
-    assert len(routes) >= 10
+    assert len(routes) >= 40
     for name, headers in sets.items():
         for kind, method, path in routes:
             is_file = path in ("/", "/index.html", "/favicon.svg") or path.startswith("/assets/")

@@ -10,6 +10,9 @@ from pathlib import Path
 import httpx
 import pytest
 
+from app.cli import create_cli
+from app.errors import BadInputError
+
 
 def airlens(*arguments: str) -> list[str]:
     return [str(Path(sys.executable).with_name("airlens")), *arguments]
@@ -35,11 +38,8 @@ def test_serve_prints_an_address_whose_token_opens_the_service(tmp_path: Path):
 
 @pytest.mark.parametrize("options", [["--host", "0.0.0.0"], ["--host", "0.0.0.0", "--expose"]])
 def test_other_addresses_need_a_flag_and_tls(tmp_path: Path, options: list[str]):
-    done = subprocess.run(
-        airlens("serve", str(tmp_path), *options), capture_output=True, text=True, timeout=60
-    )
-    assert done.returncode == 2
-    assert "--tls-certificate" in done.stderr
+    with pytest.raises(BadInputError, match="--tls-certificate"):
+        create_cli()(["serve", str(tmp_path), *options], standalone_mode=False)
 
 
 def test_a_token_that_others_can_read_is_refused(tmp_path: Path):
@@ -47,6 +47,5 @@ def test_a_token_that_others_can_read_is_refused(tmp_path: Path):
     folder.mkdir()
     (folder / "token").write_text("t" * 43)
     os.chmod(folder / "token", 0o644)
-    done = subprocess.run(airlens("serve", str(tmp_path)), capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    assert "--new-token" in done.stderr
+    with pytest.raises(BadInputError, match="--new-token"):
+        create_cli()(["serve", str(tmp_path)], standalone_mode=False)

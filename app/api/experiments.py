@@ -1,0 +1,98 @@
+"""Experiments: one folder each; the rig, the scene, and counts of what was taken and computed."""
+
+from datetime import UTC, datetime
+from typing import Any, Literal
+
+from fastapi import APIRouter
+from pydantic import Field
+
+from app.api.services import Given
+from app.api.strict import Identifier, Strict
+from app.configuration import to_plain
+from app.experiment import Experiment, save_settings
+from app.rehearsal import Rehearsal, rehearse
+
+router = APIRouter(tags=["experiments"])
+
+
+class ExperimentLine(Strict):
+    """One line of the list of experiments."""
+
+    experiment: str
+    title: str
+    information: str
+    camera: str
+    calibrated: bool
+    captures: int
+    results: int
+    changed: str
+
+
+class ExperimentResource(ExperimentLine):
+    """One experiment with its rig and scene as they stand in experiment.toml."""
+
+    settings: dict[str, Any]
+
+
+class NewExperiment(Strict):
+    """A simulated rig before the packaged room; real rigs are described in experiment.toml."""
+
+    kind: Literal["simulated"]
+    title: str = Field(default="Simulated room", min_length=1, max_length=200)
+    camera_px: int = Field(default=512, ge=64, le=4096)
+    light: Literal["texture", "projector"] = "texture"
+    boundary: Literal["paper", "operator", "surveyed"] = "surveyed"
+
+
+class ExperimentChange(Strict):
+    """What people wrote about it."""
+
+    title: str | None = Field(default=None, max_length=200)
+    information: str | None = Field(default=None, max_length=10_000)
+
+
+@router.get("/experiments")
+def list_experiments(given: Given) -> list[ExperimentLine]:
+    """List the experiments, newest first."""
+    return [_line(given.folders.open(folder.name)) for folder in given.folders.all()]
+
+
+@router.post("/experiments", status_code=201)
+def create_experiment(given: Given, new: NewExperiment) -> ExperimentResource:
+    """Make an experiment with a simulated rig, ready to be connected."""
+    made = rehearse(given.folders.root, Rehearsal(new.title, new.camera_px, new.light, new.boundary))
+    given.ledger.append_event("experiment", {"experiment": made.folder.name, "created": True})
+    return _resource(made)
+
+
+@router.get("/experiments/{experiment}")
+def read_experiment(given: Given, experiment: Identifier) -> ExperimentResource:
+    """Return one experiment."""
+    return _resource(given.folders.open(experiment))
+
+
+@router.patch("/experiments/{experiment}")
+def change_experiment(given: Given, experiment: Identifier, change: ExperimentChange) -> ExperimentResource:
+    """Change title or notes."""
+    found = given.folders.open(experiment)
+    new = found.settings.model_copy(update=change.model_dump(exclude_none=True))
+    return _resource(save_settings(found.folder, new))
+
+
+def _line(experiment: Experiment) -> ExperimentLine:
+    settings = experiment.settings
+    changed_s = (experiment.folder / "experiment.toml").stat().st_mtime
+    return ExperimentLine(
+        experiment=experiment.folder.name,
+        title=settings.title,
+        information=settings.information,
+        camera=settings.rig.camera.kind,
+        calibrated=experiment.bundle_path.is_file(),
+        captures=len(experiment.captures()),
+        results=len(list(experiment.results_folder.glob("*/manifest.json"))),
+        changed=datetime.fromtimestamp(changed_s, UTC).isoformat(timespec="seconds"),
+    )
+
+
+def _resource(experiment: Experiment) -> ExperimentResource:
+    return ExperimentResource(**_line(experiment).model_dump(), settings=to_plain(experiment.settings))

@@ -1,0 +1,350 @@
+"""A typed client of the service, for notebooks and other programs.
+
+with Client("http://127.0.0.1:8765/#token=...") as airlens:
+    job = airlens.submit_job("reconstruct", experiment="20260101T120000-room", settings={"preset": "draft"})
+    airlens.wait(job.job)
+"""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal, Self, TypeVar
+
+import httpx
+import numpy as np
+from jaxtyping import Float
+from pydantic import TypeAdapter
+
+from app.api.about import About, Health
+from app.api.calibrations import CalibrationResource
+from app.api.captures import CaptureResource, DeskResource, Role
+from app.api.devices import CameraResource
+from app.api.events import EventResource
+from app.api.experiments import ExperimentLine, ExperimentResource
+from app.api.jobs import Curves, JobResource
+from app.api.problems import MEDIA_TYPE, Problem
+from app.api.results import PresetResource, ResultLine, ResultResource
+from app.api.shift import ShiftResource
+from app.api.uploads import Upload
+from app.durable import write_durably
+from app.errors import AirlensError, BadInputError
+
+T = TypeVar("T")
+ENDED = ("done", "failed", "cancelled")
+Action = Literal["cancel", "pause", "resume", "retry"]
+
+
+class ServiceError(AirlensError):
+    """The service refused or failed; `problem` says why and what to do."""
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem.detail)
+        self.problem = problem
+
+
+class Client:
+    """One service, reached at the address that `airlens serve` prints."""
+
+    def __init__(self, address: str, token: str | None = None, timeout_s: float = 200.0) -> None:
+        base, _, fragment = address.partition("#")
+        token = token or fragment.removeprefix("token=")
+        if not token:
+            raise BadInputError(
+                "The address holds no token. Give it as `airlens serve` printed it, #token=... included."
+            )
+        # Only this service is ever asked: no proxy from the environment, no redirect.
+        self._http = httpx.Client(
+            base_url=base.rstrip("/") + "/api",
+            headers={"Authorization": f"Bearer {token}"},
+            timeout=timeout_s,
+            trust_env=False,
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._http.close()
+
+    def health(self) -> Health:
+        """Return the service's margins."""
+        return self._ask(Health, "GET", "/health")
+
+    def about(self) -> About:
+        """Return versions and machine."""
+        return self._ask(About, "GET", "/about")
+
+    # Devices
+
+    def devices(self) -> list[CameraResource]:
+        """List the devices and their states."""
+        return self._ask(list[CameraResource], "GET", "/devices")
+
+    def camera(self) -> CameraResource:
+        """Return the camera's state."""
+        return self._ask(CameraResource, "GET", "/devices/camera")
+
+    def connect_camera(self, experiment: str, air: Literal["still", "moving"] = "still") -> CameraResource:
+        """Connect the camera of an experiment's rig."""
+        return self._ask(
+            CameraResource, "POST", "/devices/camera/connect", {"experiment": experiment, "air": air}
+        )
+
+    def disconnect_camera(self) -> CameraResource:
+        """Let the camera go."""
+        return self._ask(CameraResource, "POST", "/devices/camera/disconnect")
+
+    def change_camera(self, exposure_s: float | None = None, gain: float | None = None) -> CameraResource:
+        """Set exposure or gain; the answer holds what was granted."""
+        return self._ask(CameraResource, "PATCH", "/devices/camera", {"exposure_s": exposure_s, "gain": gain})
+
+    def frame(self, stretch: bool = False) -> bytes:
+        """Return one JPEG of what the camera sees now."""
+        return self._bytes("/devices/camera/frame", {"stretch": "1" if stretch else "0"}).content
+
+    def shift(self) -> ShiftResource:
+        """Return how far the picture moved since the reference; for the eyes."""
+        return self._ask(ShiftResource, "GET", "/devices/camera/shift")
+
+    # Experiments and results
+
+    def experiments(self) -> list[ExperimentLine]:
+        """List the experiments, newest first."""
+        return self._ask(list[ExperimentLine], "GET", "/experiments")
+
+    def experiment(self, experiment: str) -> ExperimentResource:
+        """Return one experiment with its settings."""
+        return self._ask(ExperimentResource, "GET", f"/experiments/{experiment}")
+
+    def create_experiment(
+        self,
+        title: str = "Simulated room",
+        camera_px: int = 512,
+        light: Literal["texture", "projector"] = "texture",
+        boundary: Literal["paper", "operator", "surveyed"] = "surveyed",
+    ) -> ExperimentResource:
+        """Make an experiment with a simulated rig."""
+        body = {
+            "kind": "simulated",
+            "title": title,
+            "camera_px": camera_px,
+            "light": light,
+            "boundary": boundary,
+        }
+        return self._ask(ExperimentResource, "POST", "/experiments", body)
+
+    def calibration(self, experiment: str) -> CalibrationResource:
+        """Return the calibration in use."""
+        return self._ask(CalibrationResource, "GET", f"/experiments/{experiment}/calibration")
+
+    def calibrate(self, experiment: str) -> CalibrationResource:
+        """Calibrate a simulated rig."""
+        path = f"/experiments/{experiment}/calibration"
+        return self._ask(CalibrationResource, "POST", path, {"kind": "simulated"})
+
+    def captures(self, experiment: str) -> list[CaptureResource]:
+        """List the captures of an experiment."""
+        return self._ask(list[CaptureResource], "GET", f"/experiments/{experiment}/captures")
+
+    def capture(self, experiment: str, capture: str) -> CaptureResource:
+        """Return one capture."""
+        return self._ask(CaptureResource, "GET", f"/experiments/{experiment}/captures/{capture}")
+
+    def start_capture(self, experiment: str, role: Role, frames: int = 100, **settings: Any) -> DeskResource:
+        """Begin a capture; `settings` are those of NewCapture."""
+        body = {"role": role, "frames": frames, **settings}
+        return self._ask(DeskResource, "POST", f"/experiments/{experiment}/captures", body)
+
+    def running_capture(self) -> DeskResource:
+        """Return the capture that is being taken, or the last one."""
+        return self._ask(DeskResource, "GET", "/captures/running")
+
+    def abort_capture(self, discard: bool = False) -> DeskResource:
+        """End the running capture within a frame."""
+        return self._ask(DeskResource, "POST", "/captures/running/abort", {"discard": discard})
+
+    def annotate_capture(self, experiment: str, capture: str, notes: str) -> CaptureResource:
+        """Write notes beside a capture."""
+        path = f"/experiments/{experiment}/captures/{capture}"
+        return self._ask(CaptureResource, "PATCH", path, {"notes": notes})
+
+    def discard_capture(self, experiment: str, capture: str) -> None:
+        """Remove a capture with everything in it."""
+        _check(self._http.delete(f"/experiments/{experiment}/captures/{capture}"))
+
+    def capture_picture(self, experiment: str, capture: str, width: int = 320) -> bytes:
+        """Return a small PNG of a capture, for the eyes."""
+        path = f"/experiments/{experiment}/captures/{capture}/picture"
+        return self._bytes(path, {"width": str(width)}).content
+
+    def capture_image(self, experiment: str, capture: str) -> Float[np.ndarray, "rows cols"]:
+        """Return a capture's mean image as fractions of full scale."""
+        path = f"/experiments/{experiment}/captures/{capture}/image"
+        return _unpack(self._bytes(path, {"encoding": "f32"}))
+
+    def change_experiment(
+        self, experiment: str, title: str | None = None, information: str | None = None
+    ) -> ExperimentResource:
+        """Change title or notes."""
+        body = {"title": title, "information": information}
+        return self._ask(ExperimentResource, "PATCH", f"/experiments/{experiment}", body)
+
+    def results(self, experiment: str) -> list[ResultLine]:
+        """List the results of an experiment."""
+        return self._ask(list[ResultLine], "GET", f"/experiments/{experiment}/results")
+
+    def result(self, experiment: str, result: str) -> ResultResource:
+        """Return one result without its numbers."""
+        return self._ask(ResultResource, "GET", f"/experiments/{experiment}/results/{result}")
+
+    def volume(self, experiment: str, result: str, field: str) -> Float[np.ndarray, "nx ny nz"]:
+        """Return a field as float32, index order [ix, iy, iz]."""
+        path = f"/experiments/{experiment}/results/{result}/volumes/{field}"
+        return _unpack(self._bytes(path, {"encoding": "f32"}))
+
+    def slice(
+        self, experiment: str, result: str, field: str, axis: Literal["x", "y", "z"], index: int
+    ) -> Float[np.ndarray, "rows cols"]:
+        """Return one plane of a field as float32."""
+        path = f"/experiments/{experiment}/results/{result}/slices/{field}"
+        return _unpack(self._bytes(path, {"axis": axis, "index": str(index), "encoding": "f32"}))
+
+    def history(self, experiment: str, result: str) -> list[dict[str, float | None]]:
+        """Return what was recorded while it was solved."""
+        path = f"/experiments/{experiment}/results/{result}/history"
+        return self._ask(list[dict[str, float | None]], "GET", path)
+
+    def report(self, experiment: str, result: str) -> str:
+        """Return the report as one page of HTML."""
+        return self._bytes(f"/experiments/{experiment}/results/{result}/report").text
+
+    def export(self, experiment: str, result: str, form: Literal["nc", "vti", "csv"], file: Path) -> Path:
+        """Write a result as a file for another program."""
+        path = f"/experiments/{experiment}/results/{result}/exports/{form}"
+        content = self._bytes(path).content
+        write_durably(file, lambda temporary: temporary.write_bytes(content))
+        return file
+
+    def presets(self) -> list[PresetResource]:
+        """List the ways to solve."""
+        return self._ask(list[PresetResource], "GET", "/presets")
+
+    # Jobs and events
+
+    def job_kinds(self) -> list[str]:
+        """List what a job can compute."""
+        return self._ask(list[str], "GET", "/job-kinds")
+
+    def jobs(self, state: str | None = None) -> list[JobResource]:
+        """List jobs."""
+        return self._ask(list[JobResource], "GET", "/jobs", query={"state": state} if state else None)
+
+    def job(self, job: str) -> JobResource:
+        """Return one job."""
+        return self._ask(JobResource, "GET", f"/jobs/{job}")
+
+    def submit_job(
+        self,
+        kind: str,
+        settings: dict[str, Any] | None = None,
+        experiment: str | None = None,
+        title: str = "",
+        priority: int = 0,
+        key: str | None = None,
+    ) -> JobResource:
+        """Queue a job."""
+        body = {
+            "kind": kind,
+            "settings": settings or {},
+            "experiment": experiment,
+            "title": title,
+            "priority": priority,
+            "key": key,
+        }
+        return self._ask(JobResource, "POST", "/jobs", body)
+
+    def act_on_job(self, job: str, action: Action) -> JobResource:
+        """Cancel, pause, resume or retry a job."""
+        return self._ask(JobResource, "POST", f"/jobs/{job}/{action}")
+
+    def order_job(self, job: str, priority: int | None = None, before: str | None = None) -> JobResource:
+        """Change where a waiting job stands."""
+        return self._ask(JobResource, "PATCH", f"/jobs/{job}", {"priority": priority, "before": before})
+
+    def curves(self, job: str, points: int = 2000) -> Curves:
+        """Return what a job told while it ran."""
+        return self._ask(Curves, "GET", f"/jobs/{job}/curves", query={"points": str(points)})
+
+    def wait(self, job: str, limit_s: float = 3600.0, every_s: float = 0.5) -> JobResource:
+        """Return a job once it ended. Raises TimeoutError after `limit_s`."""
+        until_s = time.monotonic() + limit_s
+        while (found := self.job(job)).state not in ENDED:
+            if time.monotonic() > until_s:
+                raise TimeoutError(f"Job {job} is {found.state} after {limit_s:g} s; ask again later.")
+            time.sleep(every_s)
+        return found
+
+    def events(self, after: int | None = None) -> Iterator[EventResource]:
+        """Yield what happens from now on, or since event `after`; without end."""
+        headers = {} if after is None else {"Last-Event-ID": str(after)}
+        with self._http.stream("GET", "/events", headers=headers, timeout=None) as answer:
+            _check(answer)
+            for line in answer.iter_lines():
+                if line.startswith("data: "):
+                    yield EventResource.model_validate_json(line.removeprefix("data: "))
+
+    def past_events(self, after: int = 0, job: str | None = None, limit: int = 500) -> list[EventResource]:
+        """List what happened after event `after`, oldest first."""
+        query = {"after": str(after), "limit": str(limit)} | ({} if job is None else {"job": job})
+        return self._ask(list[EventResource], "GET", "/events/list", query=query)
+
+    # Uploads
+
+    def upload(self, file: Path) -> Upload:
+        """Send a PNG, TIFF, NPY or NPZ file."""
+        with file.open("rb") as content:
+            answer = self._http.post(
+                "/uploads", content=content, headers={"Content-Type": "application/octet-stream"}
+            )
+        return _read(Upload, answer)
+
+    def uploads(self) -> list[Upload]:
+        """List the uploads."""
+        return self._ask(list[Upload], "GET", "/uploads")
+
+    def delete_upload(self, upload: str) -> None:
+        """Remove an upload."""
+        _check(self._http.delete(f"/uploads/{upload}"))
+
+    def _ask(
+        self, kind: type[T], method: str, path: str, body: Any = None, query: dict[str, str] | None = None
+    ) -> T:
+        return _read(kind, self._http.request(method, path, json=body, params=query))
+
+    def _bytes(self, path: str, query: dict[str, str] | None = None) -> httpx.Response:
+        answer = self._http.get(path, params=query)
+        _check(answer)
+        return answer
+
+
+def _read(kind: type[T], answer: httpx.Response) -> T:
+    _check(answer)
+    return TypeAdapter(kind).validate_json(answer.content)
+
+
+def _check(answer: httpx.Response) -> None:
+    if answer.is_success:
+        return
+    answer.read()
+    if answer.headers.get("content-type") == MEDIA_TYPE:
+        raise ServiceError(Problem.model_validate_json(answer.content))
+    raise AirlensError(f"The service answered {answer.status_code} without an explanation. Is it airlens?")
+
+
+def _unpack(answer: httpx.Response) -> Float[np.ndarray, "*shape"]:
+    shape = tuple(int(part) for part in answer.headers["x-shape"].split(","))
+    return np.frombuffer(answer.content, "<f4").reshape(shape).astype(np.float32)

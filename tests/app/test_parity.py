@@ -1,0 +1,94 @@
+"""Whatever the page can do, a program and a shell can do too: a table made from their sources."""
+
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+from fastapi import FastAPI
+
+from app.api import create_app
+from app.api.settings import new_token, service_config
+from app.commands.remote import requests
+
+SOURCES = Path(__file__).resolve().parents[2] / "web" / "src"
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
+    return create_app(service_config(tmp_path_factory.mktemp("data"), new_token(), 8765))
+
+
+def shape(path: str) -> tuple[str, ...]:
+    """A path with every variable part replaced by *."""
+    return tuple(
+        "*" if re.search(r"[{$]", part) else part for part in path.split("?")[0].strip("/").split("/")
+    )
+
+
+def described(app: FastAPI) -> dict[tuple[str, tuple[str, ...]], str]:
+    return {
+        (method.upper(), shape(path.removeprefix("/api"))): f"{method.upper()} {path}"
+        for path, item in app.openapi()["paths"].items()
+        for method in item
+    }
+
+
+def asked_by_the_page() -> set[tuple[str, tuple[str, ...]]]:
+    """Every request in the page's sources; a local `path` or `pathOf(...)` is put in first."""
+    found = set()
+    for file in SOURCES.rglob("*"):
+        if file.suffix not in (".ts", ".svelte"):
+            continue
+        text = file.read_text(encoding="utf-8")
+        local = re.search(r"path = (?:\$derived\()?`([^`]+)`", text)
+        text = text.replace("${path}", local.group(1) if local else "/experiments/${e}/results/${r}")
+        text = text.replace("${pathOf(one)}", "/experiments/${e}/results/${r}")
+        text = text.replace("${pathOf(result)}", "/experiments/${e}/results/${r}")
+        for method, path in re.findall(r"""\b(get|post|numbers)(?:<[^(]*>)?\(\s*[`"](/[^`"]+)[`"]""", text):
+            found.add(("POST" if method == "post" else "GET", shape(path)))
+        for method, path in re.findall(r"""ask(?:<[^(]*>)?\(\s*"(\w+)",\s*[`"](/[^`"]+)[`"]""", text):
+            found.add((method, shape(path)))
+        for path in re.findall(r"""[`"]/api(/[^`"]+)[`"]""", text):
+            found.add(("GET", shape(path)))
+    return found
+
+
+def asked_by_the_client() -> set[tuple[str, tuple[str, ...]]]:
+    found = set()
+    for method in requests().values():
+        text = inspect.getsource(method)
+        paths = re.findall(r"""f?"(/[^"]*)\"""", text)
+        verb = re.search(r'"(GET|POST|PATCH|DELETE)"', text)
+        if "self._http.delete" in text:
+            name = "DELETE"
+        elif "self._http.post" in text:
+            name = "POST"
+        else:
+            name = verb.group(1) if verb else "GET"
+        found |= {(name, shape(path)) for path in paths}
+    return found
+
+
+def matches(wanted: tuple[str, ...], offered: tuple[str, ...]) -> bool:
+    """Whether a request fits a described path: literal parts are equal, variable ones may be anything."""
+    return len(wanted) == len(offered) and all(b in ("*", a) for a, b in zip(wanted, offered, strict=True))
+
+
+def test_every_request_of_the_page_is_described(app: FastAPI):
+    asked = asked_by_the_page()
+    assert len(asked) >= 20
+    for method, path in asked:
+        if path[:1] == ("session",) or path[-1] == "live":
+            continue
+        assert any(m == method and matches(path, p) for m, p in described(app)), (method, path)
+
+
+def test_every_operation_is_in_the_client_and_so_in_the_shell(app: FastAPI):
+    asked = asked_by_the_client()
+    browsers_own = {("POST", ("session",)), ("DELETE", ("session",))}
+    mjpeg = ("GET", shape("/devices/camera/live.mjpeg"))
+    for key, operation in described(app).items():
+        if key in browsers_own or key == mjpeg:
+            continue
+        assert any(key[0] == m and matches(p, key[1]) for m, p in asked), f"the client lacks {operation}"

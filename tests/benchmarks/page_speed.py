@@ -1,0 +1,134 @@
+"""Measures the page in Debian's Chromium (software rendering) against a real service; one JSON line each.
+
+    python -m tests.benchmarks.page_speed
+
+live: frames/s of a 1.3 Mpx picture and the age of a frame when it is on the canvas; volume: time of one frame
+of a 64^3 field at 640 x 480; curves: 80,000 points told by a job, time to draw an update.
+"""
+
+import argparse
+import json
+import os
+import sqlite3
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from playwright.sync_api import Page, sync_playwright
+
+from app.experiment import write_manifest
+from app.jobs import JobSpec
+from app.rehearsal import Rehearsal, rehearse
+from app.results import write_result
+from core.result import Solution
+from drivers.simulated import SimulatedCamera
+from tests.browser.conftest import CHROMIUM, FLAGS, Station
+
+POINTS = 80_000
+
+
+def tell(what: str, **numbers: Any) -> None:
+    print(json.dumps({"what": what, **numbers, "load_average": round(os.getloadavg()[0], 1)}), flush=True)
+
+
+def live(page: Page, station: Station, seconds: float) -> None:
+    rows, cols = np.mgrid[0:1024, 0:1280].astype(np.float32)
+    view = (0.5 + 0.3 * np.sin(rows / 5) * np.sin(cols / 5)).astype(np.float32)
+    camera = station.app.state.services.camera
+    camera.open(
+        station.app.state.services.folders.all()[0].name, lambda: SimulatedCamera(lambda: view, seed=1)
+    )
+    born: dict[int, float] = {}
+    key = -1
+    camera.watch(key, lambda frame: born.setdefault(frame.number, time.time()))
+    page.reload()
+    canvas = page.locator("canvas.picture")
+    canvas.wait_for()
+    time.sleep(2)
+    ages_s, first, began_s = [], int(canvas.get_attribute("data-frames") or 0), time.monotonic()
+    while time.monotonic() - began_s < seconds:
+        number, shown_ms = (canvas.get_attribute("data-shown-at") or "0 0").split()
+        if int(number) in born:
+            ages_s.append(float(shown_ms) / 1000 - born[int(number)])
+        time.sleep(0.02)
+    last = int(canvas.get_attribute("data-frames") or 0)
+    camera.leave(key)
+    tell(
+        "live",
+        frames_per_s=round((last - first) / (time.monotonic() - began_s), 1),
+        p50_ms=round(1000 * float(np.percentile(ages_s, 50)), 1),
+        p95_ms=round(1000 * float(np.percentile(ages_s, 95)), 1),
+    )
+
+
+def volume(page: Page) -> None:
+    page.get_by_role("button", name="Look", exact=True).click()
+    page.get_by_role("button", name="Show the volume").click()
+    place = page.locator(".volume")
+    place.wait_for()
+    page.locator(".volume canvas").wait_for()
+    time.sleep(8)
+    place.evaluate("e => { e.style.width = '640px'; e.style.height = '480px'; }")
+    slider = page.locator("input[type=range]").last
+    times_ms = []
+    for _ in range(12):
+        slider.press("ArrowRight")
+        times_ms.append(float(place.get_attribute("data-frame-ms") or "nan"))
+    tell("volume", edge=64, frame_ms=round(float(np.median(times_ms[2:])), 1))
+
+
+def curves(page: Page, station: Station) -> None:
+    ledger = station.app.state.services.ledger
+    job = ledger.submit(JobSpec(kind="noise-study", title="long", settings={"trials": 4, "size_px": 64})).id
+    with sqlite3.connect(station.root / "jobs" / "ledger.sqlite") as database:
+        body = '{{"step": {0}, "steps": 90000, "loss": {1}}}'
+        told = (
+            (job, 1, time.time(), "progress", body.format(n, 1 / (n + 1))) for n in range(100, POINTS + 100)
+        )
+        database.executemany(
+            "INSERT INTO events (job_id, attempt, at_s, kind, body) VALUES (?,?,?,?,?)", told
+        )
+    page.get_by_role("button", name="Reconstruct", exact=True).click()
+    page.locator(".chart canvas").wait_for(timeout=60_000)
+    times_ms = []
+    for step in range(6):
+        ledger.append_event("progress", {"step": POINTS + 200 + step, "steps": 90_000, "loss": 0.1}, job=job)
+        time.sleep(1.5)
+        times_ms.append(float(page.locator(".chart").get_attribute("data-update-ms") or "nan"))
+    tell("curves", points=POINTS, update_ms=round(float(np.nanmedian(times_ms)), 1))
+
+
+def result(station: Station) -> None:
+    made = rehearse(station.app.state.services.folders.root, Rehearsal(camera_px=128))
+    axes = [np.linspace(0.0, 3.0, 64)] * 3
+    x, y, z = np.meshgrid(*axes, indexing="ij")
+    warm = (293 + 5 * np.exp(-((x - 1.5) ** 2 + (y - 1.5) ** 2) - (z - 1) ** 2)).astype(np.float32)
+    velocity = np.stack([0.2 * z, 0 * y, 0.1 * x], -1).astype(np.float32)
+    folder = made.results_folder / "synthetic"
+    folder.mkdir(parents=True)
+    write_result(folder / "result.nc", Solution(*axes, temperature_k=warm, velocity_m_s=velocity), {})
+    write_manifest(folder, {"preset": "draft"})
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=10.0)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        station = Station(Path(folder))
+        station.start()
+        result(station)
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.goto(station.address)
+        live(page, station, options.seconds)
+        volume(page)
+        curves(page, station)
+        browser.close()
+        station.stop()
+
+
+if __name__ == "__main__":
+    main()

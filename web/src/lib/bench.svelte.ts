@@ -1,0 +1,239 @@
+// What the page knows of the service, kept fresh by one stream of events. Nothing here is the only copy:
+// closing the tab loses nothing.
+import { ask, get, openSession, post, ProblemError, type Problem } from "./api";
+import type { Camera, Capture, Desk, Experiment, Job, ResultLine, ServiceEvent } from "./types";
+
+export const PAGES = ["Rig", "Calibrate", "Capture", "Reconstruct", "Look"] as const;
+export type Page = (typeof PAGES)[number];
+
+const ACTIVE = ["queued", "running", "pausing", "cancelling", "lost"];
+
+export interface Step {
+  label: string;
+  page: Page;
+  busy: boolean;
+  act: () => Promise<unknown>;
+}
+
+class Bench {
+  page = $state<Page>("Rig");
+  connected = $state(false);
+  experiments = $state.raw<Experiment[]>([]);
+  experiment = $state<string | null>(null);
+  camera = $state.raw<Camera | null>(null);
+  desk = $state.raw<Desk | null>(null);
+  captures = $state.raw<Capture[]>([]);
+  jobs = $state.raw<Job[]>([]);
+  results = $state.raw<ResultLine[]>([]);
+  result = $state<string | null>(null);
+  problem = $state.raw<Problem | null>(null);
+  working = $state<string | null>(null);
+  done = $state("");
+
+  private stream: EventSource | null = null;
+  private pending = new Set<string>();
+
+  current = $derived(this.experiments.find((one) => one.experiment === this.experiment) ?? null);
+  active = $derived(this.jobs.filter((job) => ACTIVE.includes(job.state)));
+  finished = $derived(this.captures.filter((one) => one.state === "finished"));
+  next = $derived.by(() => this.nextStep());
+
+  async start(): Promise<void> {
+    await this.attempt("Opening", async () => {
+      await openSession();
+      await this.refresh();
+      this.listen();
+    });
+    if (!this.stream) setTimeout(() => void this.start(), 2000);
+  }
+
+  /** Runs an action; what goes wrong is shown in the service's own words until it is dismissed. */
+  async attempt<T>(what: string, action: () => Promise<T>): Promise<T | undefined> {
+    this.working = what;
+    try {
+      const outcome = await action();
+      this.problem = null;
+      return outcome;
+    } catch (error) {
+      if (!(error instanceof ProblemError)) throw error;
+      this.problem = error.problem;
+      return undefined;
+    } finally {
+      this.working = null;
+    }
+  }
+
+  async refresh(): Promise<void> {
+    [this.experiments, this.camera, this.desk, this.jobs] = await Promise.all([
+      get<Experiment[]>("/experiments"),
+      get<Camera>("/devices/camera"),
+      get<Desk>("/captures/running"),
+      get<Job[]>("/jobs"),
+    ]);
+    const known = this.experiments.some((one) => one.experiment === this.experiment);
+    if (!known) this.experiment = this.camera.experiment ?? this.experiments[0]?.experiment ?? null;
+    await this.refreshExperiment();
+  }
+
+  async refreshExperiment(): Promise<void> {
+    if (!this.experiment) return;
+    const path = `/experiments/${this.experiment}`;
+    [this.captures, this.results] = await Promise.all([
+      get<Capture[]>(`${path}/captures`),
+      get<ResultLine[]>(`${path}/results`),
+    ]);
+    const finished = this.results.filter((one) => one.state === "finished");
+    if (!finished.some((one) => one.result === this.result)) this.result = finished[0]?.result ?? null;
+  }
+
+  async choose(experiment: string): Promise<void> {
+    this.experiment = experiment;
+    this.result = null;
+    await this.attempt("Opening", () => this.refreshExperiment());
+  }
+
+  // Actions: each is one request of the API.
+
+  async createSimulated(): Promise<void> {
+    const made = await post<Experiment>("/experiments", { kind: "simulated", title: "Simulated room" });
+    this.experiment = made.experiment;
+    await this.connect();
+    await this.refresh();
+  }
+
+  async connect(): Promise<void> {
+    this.camera = await post<Camera>("/devices/camera/connect", { experiment: this.experiment });
+  }
+
+  async disconnect(): Promise<void> {
+    this.camera = await post<Camera>("/devices/camera/disconnect");
+  }
+
+  async calibrate(): Promise<void> {
+    await post(`/experiments/${this.experiment}/calibration`, { kind: "simulated" });
+    await this.refresh();
+  }
+
+  async capture(role: string, frames: number): Promise<void> {
+    this.desk = await post<Desk>(`/experiments/${this.experiment}/captures`, { role, frames });
+  }
+
+  async abort(discard: boolean): Promise<void> {
+    this.desk = await post<Desk>("/captures/running/abort", { discard });
+    await this.refreshExperiment();
+  }
+
+  async reconstruct(preset: string): Promise<void> {
+    await post<Job>("/jobs", {
+      kind: "reconstruct",
+      experiment: this.experiment,
+      title: `${preset}: ${this.current?.title ?? this.experiment}`,
+      settings: { preset },
+      key: crypto.randomUUID(),
+    });
+    this.jobs = await get<Job[]>("/jobs");
+  }
+
+  async act(job: Job, action: string): Promise<void> {
+    await ask<Job>("POST", `/jobs/${job.job}/${action}`, {});
+    this.jobs = await get<Job[]>("/jobs");
+  }
+
+  async export(format: string): Promise<void> {
+    const path = `/experiments/${this.experiment}/results/${this.result}/exports/${format}`;
+    const answer = await fetch(`/api${path}`);
+    if (!answer.ok) throw new ProblemError((await answer.json()) as Problem);
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(await answer.blob());
+    const named = /filename="?([^";]+)/.exec(answer.headers.get("Content-Disposition") ?? "");
+    link.download = named?.[1] ?? `${this.result}.${format}`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+    this.done = `Saved ${link.download}`;
+  }
+
+  private nextStep(): Step {
+    const running = this.desk?.state === "running";
+    const job = this.active.find((one) => one.experiment === this.experiment);
+    const has = (role: string) => this.finished.some((one) => one.role === role);
+    const step = (label: string, page: Page, act: () => Promise<unknown>, busy = false) => ({ label, page, act, busy });
+    const nothing = () => Promise.resolve();
+    if (!this.experiment) return step("Start a simulated rig", "Rig", () => this.createSimulated());
+    if (this.camera?.state === "failed") return step("Reconnect the camera", "Rig", () => this.connect());
+    if (running) {
+      const { role, done, total } = this.desk!;
+      return step(`Taking the ${role}: ${done} of ${total}`, "Capture", nothing, true);
+    }
+    if (!this.current?.calibrated) return step("Calibrate", "Calibrate", () => this.calibrate());
+    if (!has("reference")) return step("Take the reference", "Capture", () => this.capture("reference", 100));
+    if (!has("flow")) return step("Take the flow", "Capture", () => this.capture("flow", 100));
+    if (job) return step(`Reconstructing: ${Math.round(100 * job.progress)} %`, "Reconstruct", nothing, true);
+    if (!this.result) return step("Reconstruct a draft", "Reconstruct", () => this.reconstruct("draft"));
+    if (this.page !== "Look") return step("Look at the result", "Look", nothing);
+    return step("Export NetCDF", "Look", () => this.export("nc"));
+  }
+
+  async takeNextStep(): Promise<void> {
+    const { label, page, act, busy } = this.next;
+    if (busy) return;
+    this.page = page;
+    this.done = "";
+    await this.attempt(label, act);
+  }
+
+  // Events
+
+  private listen(): void {
+    const stream = new EventSource("/api/events");
+    const heard = (message: MessageEvent<string>) => this.hear(JSON.parse(message.data) as ServiceEvent);
+    for (const kind of ["job", "device", "capture", "log", "experiment"]) stream.addEventListener(kind, heard);
+    stream.onopen = () => {
+      if (!this.connected) void this.later("all");
+      this.connected = true;
+    };
+    stream.onerror = () => {
+      this.connected = false;
+      // A refused stream is not tried again by the browser: a new token, or a proxy that gave up.
+      if (stream.readyState === EventSource.CLOSED) setTimeout(() => this.listen(), 2000);
+    };
+    this.stream = stream;
+  }
+
+  private hear(event: ServiceEvent): void {
+    if (event.kind === "capture") {
+      if (this.desk) this.desk = { ...this.desk, ...(event.body as Partial<Desk>) };
+      if (event.body["state"] !== "running") void this.later("experiment");
+    } else if (event.kind === "device") void this.later("camera");
+    else if (event.kind === "experiment") void this.later("all");
+    else if (event.job) {
+      this.progress(event);
+      if (event.kind === "state") void this.later("all");
+    }
+  }
+
+  private progress(event: ServiceEvent): void {
+    const { step, steps } = event.body;
+    if (typeof step !== "number" || typeof steps !== "number") return;
+    const progress = steps > 0 ? Math.min(1, step / steps) : 0;
+    this.jobs = this.jobs.map((job) => (job.job === event.job ? { ...job, step, steps, progress } : job));
+  }
+
+  /** Many events in a burst cause one look. */
+  private async later(what: "all" | "camera" | "experiment"): Promise<void> {
+    if (this.pending.has(what)) return;
+    this.pending.add(what);
+    await new Promise((resolve) => setTimeout(resolve, 100));
+    this.pending.delete(what);
+    try {
+      if (what === "camera") this.camera = await get<Camera>("/devices/camera");
+      else if (what === "experiment") await this.refreshExperiment();
+      else await this.refresh();
+      if (what === "experiment") this.desk = await get<Desk>("/captures/running");
+    } catch (error) {
+      if (!(error instanceof ProblemError)) throw error;
+      if (error.problem.code !== "unreachable") this.problem = error.problem;
+    }
+  }
+}
+
+export const bench = new Bench();

@@ -1,0 +1,62 @@
+// Colour scales that stay ordered for colour-blind eyes and in grey print, from a few measured stops.
+
+type Stop = readonly [number, number, number];
+
+// Cividis (Nunez et al. 2018), for quantities from low to high.
+const CIVIDIS: readonly Stop[] = [
+  [0, 34, 78], [18, 53, 112], [59, 73, 108], [87, 93, 109], [112, 113, 115],
+  [138, 134, 120], [165, 156, 116], [195, 179, 105], [225, 204, 85], [254, 232, 56],
+];
+// Purple to orange through white (ColorBrewer PuOr), for quantities with a sign.
+const PUOR: readonly Stop[] = [
+  [45, 0, 75], [84, 39, 136], [128, 115, 172], [178, 171, 210], [216, 218, 235],
+  [247, 247, 247], [254, 224, 182], [253, 184, 99], [224, 130, 20], [179, 88, 6], [127, 59, 8],
+];
+
+export interface Scale {
+  low: number;
+  high: number;
+  signed: boolean;
+}
+
+/** A scale for values between two bounds: symmetric about zero where the quantity has a sign. */
+export function scaleFor(name: string, low: number, high: number): Scale {
+  const signed = ["u", "v", "w", "p"].includes(name);
+  const reach = Math.max(Math.abs(low), Math.abs(high)) || 1;
+  return signed ? { low: -reach, high: reach, signed } : { low, high: high > low ? high : low + 1e-6, signed };
+}
+
+export function stops(signed: boolean): readonly Stop[] {
+  return signed ? PUOR : CIVIDIS;
+}
+
+/** 256 colours as RGB triples. */
+export function table(signed: boolean): Uint8ClampedArray {
+  const anchors = stops(signed);
+  const colours = new Uint8ClampedArray(256 * 3);
+  for (let i = 0; i < 256; i++) {
+    const at = (i / 255) * (anchors.length - 1);
+    const k = Math.min(anchors.length - 2, Math.floor(at));
+    const [a, b] = [anchors[k]!, anchors[k + 1]!];
+    for (let c = 0; c < 3; c++) colours[3 * i + c] = a[c]! + (at - k) * (b[c]! - a[c]!);
+  }
+  return colours;
+}
+
+/** Paints a plane: the first index to the right, the second upwards. */
+export function paint(values: Float32Array, shape: number[], scale: Scale): ImageData {
+  const [across, up] = [shape[0] ?? 1, shape[1] ?? 1];
+  const colours = table(scale.signed);
+  const image = new ImageData(across, up);
+  const factor = 255 / (scale.high - scale.low);
+  for (let i = 0; i < across; i++)
+    for (let j = 0; j < up; j++) {
+      const level = Math.max(0, Math.min(255, Math.round((values[i * up + j]! - scale.low) * factor)));
+      const at = 4 * ((up - 1 - j) * across + i);
+      image.data[at] = colours[3 * level]!;
+      image.data[at + 1] = colours[3 * level + 1]!;
+      image.data[at + 2] = colours[3 * level + 2]!;
+      image.data[at + 3] = 255;
+    }
+  return image;
+}

@@ -1,0 +1,61 @@
+// The live picture: one credit a frame, so that a slow page skips frames instead of falling behind.
+import type { LiveNumbers } from "./types";
+
+export interface LiveSight {
+  numbers: LiveNumbers;
+  picture: ImageBitmap;
+}
+
+export class LivePicture {
+  private socket: WebSocket | null = null;
+  private closed = false;
+  private wait_ms = 500;
+  stretch = false;
+
+  constructor(
+    private readonly show: (sight: LiveSight) => void,
+    private readonly state: (connected: boolean) => void,
+  ) {}
+
+  open(): void {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    const socket = new WebSocket(`${scheme}://${location.host}/api/devices/camera/live`);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      this.wait_ms = 500;
+      this.state(true);
+      this.ask(2);
+    };
+    socket.onmessage = (message) => void this.receive(message.data as ArrayBuffer);
+    socket.onclose = () => {
+      this.state(false);
+      if (this.closed) return;
+      setTimeout(() => !this.closed && this.open(), this.wait_ms);
+      this.wait_ms = Math.min(8000, 2 * this.wait_ms);
+    };
+    this.socket = socket;
+  }
+
+  close(): void {
+    this.closed = true;
+    this.socket?.close();
+  }
+
+  ask(credits: number): void {
+    if (this.socket?.readyState === WebSocket.OPEN)
+      this.socket.send(JSON.stringify({ credits, stretch: this.stretch }));
+  }
+
+  private async receive(message: ArrayBuffer): Promise<void> {
+    const length = new DataView(message).getUint32(0);
+    const text = new TextDecoder().decode(new Uint8Array(message, 4, length));
+    const jpeg = new Blob([new Uint8Array(message, 4 + length)], { type: "image/jpeg" });
+    try {
+      const picture = await createImageBitmap(jpeg);
+      this.show({ numbers: JSON.parse(text) as LiveNumbers, picture });
+      picture.close();
+    } finally {
+      this.ask(1);
+    }
+  }
+}
