@@ -14,12 +14,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.room.boundary import Boundary
+from core.room.boundary import Boundary, Plane
 from core.room.grid import AXES, Cells, RoomGrid, Velocity, face_mean, first_plane, last_plane
-from core.room.k_epsilon import KEpsilonState, advance, energy_walls
+from core.room.k_epsilon import KEpsilonState, advance, energy_walls, heat_walls
 from core.room.momentum import Viscosity
-
-MOLECULAR_PRANDTL = 0.71
 
 
 class AbstractClosure(eqx.Module):
@@ -43,6 +41,10 @@ class AbstractClosure(eqx.Module):
     @abc.abstractmethod
     def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
         """Effective viscosity, molecular part included."""
+
+    @abc.abstractmethod
+    def wall_heat(self, state: KEpsilonState | None, grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
+        """Factors on the walls' conductances (low, high an axis)."""
 
 
 class ConstantClosure(AbstractClosure):
@@ -69,6 +71,10 @@ class ConstantClosure(AbstractClosure):
     def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
         """The constant."""
         return _same_on_walls(jnp.full(grid.cells, 1.0) * (self.eddy_m2_s + self.molecular_m2_s))
+
+    def wall_heat(self, state: KEpsilonState | None, grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
+        """The stated conductances."""
+        return _even_walls(grid)
 
 
 class ZeroEquationClosure(AbstractClosure):
@@ -98,6 +104,10 @@ class ZeroEquationClosure(AbstractClosure):
         u, v, w = (face_mean(velocity[a], a) for a in AXES)
         speed = jnp.sqrt(u**2 + v**2 + w**2)
         return _same_on_walls(0.03874 * self.scale * speed * self.wall_distance_m + self.molecular_m2_s)
+
+    def wall_heat(self, state: KEpsilonState | None, grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
+        """The stated conductances."""
+        return _even_walls(grid)
 
 
 class KEpsilonClosure(AbstractClosure):
@@ -131,6 +141,12 @@ class KEpsilonClosure(AbstractClosure):
         cells = self.scale * state.eddy_m2_s() + self.molecular_m2_s
         return Viscosity(cells, energy_walls(state.energy_m2_s2, grid, self.molecular_m2_s))
 
+    def wall_heat(self, state: KEpsilonState | None, grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
+        """More where the air is stirred."""
+        if state is None:
+            return _even_walls(grid)
+        return heat_walls(state.energy_m2_s2, grid, self.molecular_m2_s)
+
 
 def wall_distance_m(grid: RoomGrid) -> Cells:
     """Distance of each cell centre to the nearest wall of the box."""
@@ -140,6 +156,10 @@ def wall_distance_m(grid: RoomGrid) -> Cells:
         nearest = jnp.minimum(centres, grid.cells[a] * grid.spacing_m[a] - centres)
         distance = jnp.minimum(distance, nearest.reshape([-1 if b == a else 1 for b in AXES]))
     return distance
+
+
+def _even_walls(grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
+    return tuple((jnp.ones(grid.plane(a)), jnp.ones(grid.plane(a))) for a in AXES)
 
 
 def _same_on_walls(cells_m2_s: Cells) -> Viscosity:

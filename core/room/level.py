@@ -41,19 +41,20 @@ def layer_exchange_m3_s(flow: Flow, model: RoomModel) -> Float[Array, "nz nz"]:
     up = (jnp.maximum(inner, 0.0) + diffusive).sum((0, 1)) * area
     down = (jnp.maximum(-inner, 0.0) + diffusive).sum((0, 1)) * area
     nothing = jnp.zeros(1)
-    own = jnp.concatenate([up, nothing]) + jnp.concatenate([nothing, down]) + _lost_m3_s(model)
+    own = jnp.concatenate([up, nothing]) + jnp.concatenate([nothing, down]) + _lost_m3_s(flow, model)
     return jnp.diag(own) - jnp.diag(up, -1) - jnp.diag(down, 1)
 
 
-def _lost_m3_s(model: RoomModel) -> Float[Array, " nz"]:
+def _lost_m3_s(flow: Flow, model: RoomModel) -> Float[Array, " nz"]:
     """Outflow and wall conductance of each layer."""
     grid = model.grid
     lost = jnp.zeros(grid.cells[2])
+    factors = model.closure.wall_heat(flow.turbulence, grid)
     for a in AXES:
         area = grid.face_area_m2(a)
         for side, wall in enumerate(model.boundary.walls[a]):
             outward = jnp.maximum(-wall.normal_m_s if side == 0 else wall.normal_m_s, 0.0)
-            leaving = (outward + wall.conductance_m_s) * area
+            leaving = (outward + factors[a][side] * wall.conductance_m_s) * area
             if a == 2:
                 lost = lost.at[0 if side == 0 else -1].add(leaving.sum())
             else:

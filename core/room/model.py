@@ -90,10 +90,11 @@ def air_at_rest(model: RoomModel, excess_k: Cells, speed_m_s: float) -> Flow:
 def step(flow: Flow, viscosity: Viscosity, model: RoomModel, dt_s: Float[Array, ""]) -> Flow:
     """The flow after `dt_s`, turbulence unchanged."""
     grid, boundary = model.grid, model.boundary
+    factors = model.closure.wall_heat(flow.turbulence, grid)
     inflow = tuple((low.inflow_excess_k, high.inflow_excess_k) for low, high in boundary.walls)
     heating = scalar_rate(
         flow.excess_k, inflow, flow.velocity, model.diffusivity_m2_s(viscosity), boundary, grid
-    ) + wall_heat_rate(flow.excess_k, boundary, grid)
+    ) + wall_heat_rate(flow.excess_k, boundary, factors, grid)
     excess_k = flow.excess_k + dt_s * heating
     rates = momentum_rate(flow.velocity, viscosity, model.buoyancy_m_s2_k * excess_k, boundary, grid)
     u, v, w = (_advance_inner(flow.velocity[a], dt_s * rates[a], a) for a in AXES)

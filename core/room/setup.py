@@ -29,11 +29,12 @@ class RoomParameters(eqx.Module):
     """What may be wrong, one array a kind. Temperatures in excess of ambient; logarithms are natural.
 
     `inlet_log_flow` multiplies the stated velocity; `wall_log_heat` and `heater_log_heat` are of the heat
-    coefficient in m/s; `log_closure` multiplies the eddy viscosity, `log_viscosity` on a coarse lattice.
+    coefficient in m/s, `log_heat` multiplies all walls' together; `log_closure` multiplies the eddy viscosity, `log_viscosity` on a coarse lattice.
     """
 
     inlet_excess_k: Float[Array, " inlets"]
     inlet_log_flow: Float[Array, " inlets"]
+    log_heat: Float[Array, ""]
     wall_excess_k: Float[Array, "6"]
     wall_log_heat: Float[Array, "6"]
     heater_excess_k: Float[Array, " heaters"]
@@ -53,6 +54,7 @@ class RoomLayout(eqx.Module):
     heaters: tuple[Opening, ...]
     heated: Float[np.ndarray, "6"]
     grip: Float[np.ndarray, "6"]
+    held: Float[np.ndarray, "6"]
     notes: tuple[str, ...] = eqx.field(static=True)
 
     def inflow_m3_s(self, parameters: RoomParameters) -> Float[Array, " inlets"]:
@@ -90,6 +92,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
     stated = [walls[name] for name in WALLS]
     heated = np.array([float(wall is None or wall.thermal != "adiabatic") for wall in stated])
     grip = np.array([float(wall is None or wall.no_slip) for wall in stated])
+    held = np.array([float(wall is not None and wall.thermal == "temperature") for wall in stated])
     return RoomLayout(
         grid,
         tuple(place[0]),
@@ -99,6 +102,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
         tuple(place[2]),
         heated,
         grip,
+        held,
         tuple(notes),
     )
 
@@ -129,14 +133,16 @@ def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlan
     for opening in (*layout.inlets, *layout.outlets, *layout.heaters):
         if opening.wall == wall:
             closed = closed - jnp.asarray(opening.fraction, jnp.float32)
-    conductance = float(layout.heated[wall]) * closed * jnp.exp(parameters.wall_log_heat[wall])
+    conductance = float(layout.heated[wall]) * closed * jnp.exp(parameters.log_heat + parameters.wall_log_heat[wall])
     heat = conductance * parameters.wall_excess_k[wall]
     for n, opening in enumerate(layout.heaters):
         if opening.wall == wall:
             own = jnp.asarray(opening.fraction, jnp.float32) * jnp.exp(parameters.heater_log_heat[n])
             conductance, heat = conductance + own, heat + own * parameters.heater_excess_k[n]
     return eqx.tree_at(
-        lambda w: (w.conductance_m_s, w.wall_excess_k), plane, (conductance, heat / (conductance + 1e-12))
+        lambda w: (w.conductance_m_s, w.wall_excess_k, w.held),
+        plane,
+        (conductance, heat / (conductance + 1e-12), jnp.float32(layout.held[wall])),
     )
 
 
@@ -166,4 +172,5 @@ def _with_inlet(plane: WallPlane, layout: RoomLayout, n: int, parameters: RoomPa
         put(plane.turbulent_energy_m2_s2, k * gain**2),
         put(plane.dissipation_m2_s3, epsilon * gain**3),
         plane.grip,
+        plane.held,
     )

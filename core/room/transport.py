@@ -66,13 +66,15 @@ def scalar_rate(
     return rate
 
 
-def wall_heat_rate(excess_k: Cells, boundary: Boundary, grid: RoomGrid) -> Cells:
-    """Heating of the first cells by their walls [K/s]: h (T_wall - T) / spacing."""
+def wall_heat_rate(
+    excess_k: Cells, boundary: Boundary, factors: tuple[tuple[Field, Field], ...], grid: RoomGrid
+) -> Cells:
+    """Heating of the first cells by their walls [K/s]: h (T_wall - T) / spacing, h times `factors`."""
     rate = jnp.zeros_like(excess_k)
     for a in AXES:
         low, high = boundary.walls[a]
-        below = low.conductance_m_s * (low.wall_excess_k - first_plane(excess_k, a))
-        above = high.conductance_m_s * (high.wall_excess_k - last_plane(excess_k, a))
+        below = factors[a][0] * low.conductance_m_s * (low.wall_excess_k - first_plane(excess_k, a))
+        above = factors[a][1] * high.conductance_m_s * (high.wall_excess_k - last_plane(excess_k, a))
         rate = add_to_walls(rate, below / grid.spacing_m[a], above / grid.spacing_m[a], a)
     return rate
 

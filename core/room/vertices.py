@@ -26,7 +26,8 @@ def vertex_excess_k(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]
     """Excess temperature: inlets carry the supply's, heat-passing walls their own, others their air's."""
 
     def value(wall: WallPlane, cell: Field, inward: float) -> Field:
-        held = jnp.where(wall.conductance_m_s > 0, wall.wall_excess_k, cell)
+        known = (wall.conductance_m_s > 0) & (wall.held > 0)
+        held = jnp.where(known, wall.wall_excess_k, cell)
         return jnp.where(inward * wall.normal_m_s > 0, wall.inflow_excess_k, held)
 
     planes = _on_walls(flow.excess_k, model.boundary, value)

@@ -33,6 +33,7 @@ def parameters(inlets: int, heaters: int) -> RoomParameters:
     return RoomParameters(
         jnp.full(inlets, 10.0),
         jnp.zeros(inlets),
+        jnp.float32(0.0),
         jnp.zeros(6),
         jnp.full(6, np.log(1e-3)),
         jnp.full(heaters, 20.0),

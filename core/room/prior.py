@@ -1,0 +1,151 @@
+"""What a scene states about a room as parameters, and how far each may be wrong.
+
+Supply temperature and flow carry the operator's standard deviations, but at least 2 % of the contrast and
+3 % of the flow, since nobody's model of a supply is better. Heat coefficients of walls are a guess: free
+convection gives 1 to 3 W/m2K; where a thermometer tells what leaves, their common level follows from the
+heat balance. Unknown walls are taken as leaking to the ambient temperature.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Float
+
+from core.problem import Problem
+from core.room.grid import WALLS
+from core.room.k_epsilon import NOMINAL_HEAT_M_S
+from core.room.openings import stated_walls
+from core.room.setup import RoomLayout, RoomParameters
+from core.scene import Heater, Inlet, Outlet
+
+# 1.6 W/m2K over rho c; within a factor of two (one sigma 0.6 in the logarithm).
+_WALL_HEAT_M_S, _WALL_HEAT_STD = NOMINAL_HEAT_M_S, 0.6
+_UNKNOWN_WALL_STD = 0.7
+_HEATER_HEAT_M_S, _HEATER_HEAT_STD = 2.5e-3, 0.5
+_CLOSURE_STD = 0.25
+_LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
+
+
+class Prior(eqx.Module):
+    """Mean and standard deviation of every parameter; a parameter of zero deviation is not fitted."""
+
+    mean: RoomParameters
+    std: RoomParameters
+
+    def active(self) -> np.ndarray:
+        """Indices of the fitted parameters in the flattened vector."""
+        return np.flatnonzero(np.asarray(ravel_pytree(self.std)[0]) > 0)
+
+    def vector(self, parameters: RoomParameters) -> Float[np.ndarray, " active"]:
+        """Fitted parameters in units of their deviations from the mean."""
+        flat, mean, std = (np.asarray(ravel_pytree(p)[0], float) for p in (parameters, self.mean, self.std))
+        chosen = self.active()
+        return (flat[chosen] - mean[chosen]) / std[chosen]
+
+    def parameters(self, vector: Float[np.ndarray, " active"]) -> RoomParameters:
+        """The inverse of `vector`."""
+        mean, restore = ravel_pytree(self.mean)
+        std = np.asarray(ravel_pytree(self.std)[0], float)
+        chosen = self.active()
+        flat = np.asarray(mean, float).copy()
+        flat[chosen] += vector * std[chosen]
+        return restore(jnp.asarray(flat, mean.dtype))
+
+    def names(self) -> list[str]:
+        """Names of the fitted parameters, such as 'inlet_excess_k[0]'."""
+        named = []
+        for path, leaf in jax.tree_util.tree_leaves_with_path(self.std):
+            stem = jax.tree_util.keystr(path).lstrip(".")
+            named += [f"{stem}[{n}]" if np.ndim(leaf) else stem for n in range(np.size(leaf))]
+        return [named[n] for n in self.active()]
+
+
+def room_prior(problem: Problem, layout: RoomLayout, *, log_viscosity_std: float = 0.0) -> Prior:
+    """Parameters as stated, and their spread."""
+    scene = problem.scene
+    ambient = scene.air.ambient_temperature_k
+    inlets = [b for b in scene.boundary if isinstance(b, Inlet)]
+    heaters = [b for b in scene.boundary if isinstance(b, Heater)]
+    walls = [stated_walls(scene)[name] for name in WALLS]
+    excess = np.array([i.temperature_k - ambient for i in inlets])
+    speed = np.array([float(np.linalg.norm(i.velocity_m_s)) for i in inlets])
+    contrast = max([abs(e) for e in excess] + [abs(h.temperature_k - ambient) for h in heaters] + [0.1])
+    wall_excess = np.array(
+        [0.0 if w is None or w.temperature_k is None else w.temperature_k - ambient for w in walls]
+    )
+    mean = RoomParameters(
+        _f32(excess),
+        jnp.zeros(len(inlets)),
+        jnp.float32(0.0),
+        _f32(wall_excess),
+        jnp.full(6, np.log(_heat_balance_m_s(problem, layout, excess, wall_excess))),
+        _f32([h.temperature_k - ambient for h in heaters]),
+        jnp.full(len(heaters), np.log(_HEATER_HEAT_M_S)),
+        jnp.float32(0.0),
+        jnp.zeros((3, 3, 4)),
+    )
+    std = RoomParameters(
+        _f32([max(i.temperature_std_k, _LEAST_SHARE_T * contrast) for i in inlets]),
+        _f32([max(i.velocity_std_m_s / s, _LEAST_SHARE_U) for i, s in zip(inlets, speed, strict=True)]),
+        jnp.float32(_WALL_HEAT_STD if layout.heated.any() else 0.0),
+        jnp.zeros(6),
+        _f32(layout.heated * np.where(layout.held > 0, 0.0, _UNKNOWN_WALL_STD)),
+        _f32([h.temperature_std_k for h in heaters]),
+        jnp.full(len(heaters), _HEATER_HEAT_STD),
+        jnp.float32(_CLOSURE_STD),
+        jnp.full((3, 3, 4), log_viscosity_std),
+    )
+    return Prior(mean, std)
+
+
+def outflow_excess_k(problem: Problem) -> float | None:
+    """Temperature of the leaving air, from an outlet's thermometer or from a plane's outflow; None if unknown."""
+    ambient = problem.scene.air.ambient_temperature_k
+    for part in problem.scene.boundary:
+        if isinstance(part, Outlet) and part.mean_temperature_k is not None:
+            return part.mean_temperature_k - ambient
+    for plane in problem.planes:
+        axis = WALLS.index(plane.wall) // 2
+        outward = plane.velocity_m_s[..., axis] * (-1.0 if plane.wall.endswith("min") else 1.0)
+        leaving = np.maximum(outward, 0.0)
+        if leaving.sum() > 0:
+            return float((leaving * (plane.temperature_k - ambient)).sum() / leaving.sum())
+    return None
+
+
+def _heat_balance_m_s(
+    problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
+) -> float:
+    """One heat coefficient for all walls that closes the balance, within a factor of four of the guess."""
+    leaving = outflow_excess_k(problem)
+    grid = layout.grid
+    areas = (
+        np.array([grid.face_area_m2(w // 2) * np.prod(grid.plane(w // 2)) for w in range(6)]) * layout.heated
+    )
+    if leaving is None or not layout.inlets or layout.heaters or areas.sum() == 0:
+        return _WALL_HEAT_M_S
+    normal = [
+        o.inward * v[o.axis] * o.area_m2
+        for o, v in zip(layout.inlets, layout.inlet_velocity_m_s, strict=True)
+    ]
+    brought = float(np.dot(normal, inlet_excess_k - leaving))
+    inside = _room_excess_k(problem, leaving)
+    lost = float((areas * (inside - wall_excess_k)).sum())
+    found = brought / lost if abs(lost) > 1e-9 else _WALL_HEAT_M_S
+    return float(np.clip(found, _WALL_HEAT_M_S / 4, _WALL_HEAT_M_S * 4))
+
+
+def _room_excess_k(problem: Problem, leaving: float) -> float:
+    """Mean temperature of the room's air: a side wall's plane, else what leaves."""
+    for plane in problem.planes:
+        if plane.wall[0] != "z":
+            still = np.abs(plane.velocity_m_s).max(axis=2) < 0.02 * np.abs(plane.velocity_m_s).max()
+            still[[0, -1]] = False
+            return float(plane.temperature_k[still].mean()) - problem.scene.air.ambient_temperature_k
+    return leaving
+
+
+def _f32(values: object) -> Float[Array, "..."]:
+    return jnp.asarray(np.asarray(values, float), jnp.float32)
