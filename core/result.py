@@ -24,7 +24,9 @@ class Outcome(Enum):
 class Solution(eqx.Module):
     """T, p, u on vertices (end planes included), index order [ix, iy, iz]; None where not solved for.
 
-    Standard deviations are one sigma, on the same grid. `history` holds one dict a recorded iteration.
+    Standard deviations are one sigma, on the same grid; `informed` is the share of the prior variance of
+    T that the measurements removed (0: the model speaks alone). `history` holds one dict a recorded
+    iteration.
     """
 
     x_m: Float[np.ndarray, " nx"]
@@ -36,6 +38,7 @@ class Solution(eqx.Module):
     temperature_std_k: Float[np.ndarray, "nx ny nz"] | None = None
     pressure_std_m2_s2: Float[np.ndarray, "nx ny nz"] | None = None
     velocity_std_m_s: Float[np.ndarray, "nx ny nz 3"] | None = None
+    informed: Float[np.ndarray, "nx ny nz"] | None = None
     outcome: Outcome = eqx.field(static=True, default=Outcome.converged)
     solver_s: float = 0.0
     history: tuple[dict[str, float], ...] = eqx.field(static=True, default=())

@@ -11,7 +11,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Float, Int
 
-_CORRELATED = 4.0
+CORRELATED = 4.0
 _STUDENT_NU = 3.0
 _LONGEST_STEP = 2.0
 
@@ -29,15 +29,20 @@ def gauss_newton(
     residual: Float[np.ndarray, " data"],
     variance: Float[np.ndarray, " data"],
     jacobian: Float[np.ndarray, "data active"],
+    *,
+    trusting: bool = False,
 ) -> Posterior:
-    """One step from `vector`, where the data minus the prediction is `residual`; cut where it is too long."""
-    new = vector
+    """One step from `vector`, where the data minus the prediction is `residual`; each parameter's is cut.
+
+    `trusting` keeps the prior Gaussian: for first steps, when the model is still far from the data.
+    """
+    new, normal = vector, np.eye(len(vector))
     for _ in range(6):
-        prior = (_STUDENT_NU + 1.0) / (_STUDENT_NU + new**2)
+        prior = (_STUDENT_NU + 1.0) / (_STUDENT_NU + (0.0 if trusting else 1.0) * new**2)
         normal = (jacobian.T / variance) @ jacobian + np.diag(prior)
         gradient = (jacobian.T / variance) @ residual - prior * vector
         step = np.linalg.solve(normal, gradient)
-        step *= min(1.0, _LONGEST_STEP * np.sqrt(len(vector)) / (np.linalg.norm(step) + 1e-12))
+        step = np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
         new = vector + step
     return Posterior(new, np.linalg.inv(normal), np.sqrt(variance))
 
@@ -55,12 +60,12 @@ def weighted_variance(
     total = np.zeros_like(variance)
     for g in np.unique(group):
         own = group == g
-        error = min(_spread(residual[own]), _spread(grid_difference[own]))
-        total[own] = (variance[own] + error**2) * (_CORRELATED if g <= 1 else 1.0)
+        error = min(spread(residual[own]), spread(grid_difference[own]))
+        total[own] = (variance[own] + error**2) * (CORRELATED if g <= 1 else 1.0)
     return total
 
 
-def _spread(values: Float[np.ndarray, " some"]) -> float:
+def spread(values: Float[np.ndarray, " some"]) -> float:
     """Rms with the largest twentieth left out: jets' edges must not hide the rest."""
     size = np.sort(np.abs(values))
     return float(np.sqrt(np.mean(size[: max(1, int(0.95 * len(size)))] ** 2)))

@@ -144,17 +144,22 @@ class Observations(eqx.Module):
         """What this room would have shown, in the order of `values`."""
         refractivity = self.scene.air.excess_refractivity(jnp.asarray(room.excess_k, jnp.float32))
         parts = [b.predicted(refractivity).ravel() for b in self.shifts]
-        for plane in self.planes:
-            wall = np.take(
-                room.excess_k, 0 if plane.wall.endswith("min") else -1, axis=WALLS.index(plane.wall) // 2
-            )
-            parts.append(_plane_pool(plane, _on_plane(wall, plane, self.scene.room), self.scene))
+        parts.append(self.plane_values(room.excess_k))
         for s in self.sensors:
             t, u = np.isfinite(s.temperature_k), np.isfinite(s.velocity_m_s)
             parts.append(sample(room.excess_k, s.position_m, self.scene.room)[t])
             parts.append(sample(room.velocity_m_s, s.position_m, self.scene.room)[u])
         parts += [np.array([room.outflow_excess_k]) for _ in self.outlets]
         return np.concatenate([np.asarray(p, float).ravel() for p in parts] or [np.zeros(0)])
+
+    def plane_values(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " blocks"]:
+        """The planes' pooled temperatures in a room."""
+        parts = [np.zeros(0)]
+        for plane in self.planes:
+            end = 0 if plane.wall.endswith("min") else -1
+            wall = np.take(excess_k, end, axis=WALLS.index(plane.wall) // 2)
+            parts.append(_plane_pool(plane, _on_plane(wall, plane, self.scene.room), self.scene))
+        return np.concatenate(parts)
 
 
 def observations(problem: Problem, vertices: tuple[int, int, int]) -> Observations:
@@ -173,8 +178,8 @@ def observations(problem: Problem, vertices: tuple[int, int, int]) -> Observatio
 
 
 def sample(
-    field: Float[np.ndarray, "vx vy vz *components"], points_m: Float[np.ndarray, "points 3"], room: Box
-) -> Float[np.ndarray, "points *components"]:
+    field: Float[np.ndarray, "vx vy vz ..."], points_m: Float[np.ndarray, "points 3"], room: Box
+) -> Float[np.ndarray, "points ..."]:
     """Trilinear values of a vertex field at points; points outside take the wall's."""
     axes = [np.linspace(room.lower_m[a], room.upper_m[a], field.shape[a]) for a in AXES]
     clipped = np.clip(points_m, room.lower_m, room.upper_m)

@@ -22,7 +22,7 @@ from core.scene import Heater, Inlet, Outlet
 
 # 1.6 W/m2K over rho c; within a factor of two (one sigma 0.6 in the logarithm).
 _WALL_HEAT_M_S, _WALL_HEAT_STD = NOMINAL_HEAT_M_S, 0.6
-_UNKNOWN_WALL_STD = 0.7
+_UNKNOWN_WALL_STD = 1.2
 _HEATER_HEAT_M_S, _HEATER_HEAT_STD = 2.5e-3, 0.5
 _CLOSURE_STD = 0.25
 _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
@@ -101,7 +101,7 @@ def room_prior(problem: Problem, layout: RoomLayout, *, log_viscosity_std: float
 
 
 def outflow_excess_k(problem: Problem) -> float | None:
-    """Temperature of the leaving air, from an outlet's thermometer or from a plane's outflow; None if unknown."""
+    """Temperature of the leaving air, by an outlet's thermometer or a plane's outflow; None if unknown."""
     ambient = problem.scene.air.ambient_temperature_k
     for part in problem.scene.boundary:
         if isinstance(part, Outlet) and part.mean_temperature_k is not None:

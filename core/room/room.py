@@ -54,7 +54,9 @@ class Room(eqx.Module):
             prandtl=air.prandtl,
             turbulent_prandtl=_TURBULENT_PRANDTL,
         )
-        return eqx.tree_at(lambda m: m.log_viscosity, bare, lattice_to_cells(parameters.log_viscosity, self.grid))
+        return eqx.tree_at(
+            lambda m: m.log_viscosity, bare, lattice_to_cells(parameters.log_viscosity, self.grid)
+        )
 
     def at_rest(self, model: RoomModel, profile_k: Float[np.ndarray, " nz"]) -> Flow:
         """Still air with a temperature of height only."""
@@ -67,7 +69,10 @@ class Room(eqx.Module):
         if self.closure == "zero_equation":
             return ZeroEquationClosure(wall_distance_m(self.grid), scale, molecular)
         if self.closure == "constant":
-            area = sum(o.area_m2 for o in self.layout.inlets) or float(np.prod(self.scene.room.size_m)) ** (2 / 3) / 90
+            area = (
+                sum(o.area_m2 for o in self.layout.inlets)
+                or float(np.prod(self.scene.room.size_m)) ** (2 / 3) / 90
+            )
             eddy = flow.viscosity_m2_s or _EDDY_SHARE * self.speed_m_s * area**0.5
             return ConstantClosure(scale * eddy, molecular)
         if self.closure == "molecular":
@@ -125,7 +130,9 @@ def seen(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> Predic
 
 
 @eqx.filter_jit
-def _vertices(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> tuple[Array, Array, Array, Array]:
+def _vertices(
+    flow: Flow, model: RoomModel, vertices: tuple[int, int, int]
+) -> tuple[Array, Array, Array, Array]:
     heat, volume = jnp.float32(0.0), jnp.float32(0.0)
     for a in AXES:
         for side, wall in enumerate(model.boundary.walls[a]):

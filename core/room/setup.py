@@ -29,7 +29,8 @@ class RoomParameters(eqx.Module):
     """What may be wrong, one array a kind. Temperatures in excess of ambient; logarithms are natural.
 
     `inlet_log_flow` multiplies the stated velocity; `wall_log_heat` and `heater_log_heat` are of the heat
-    coefficient in m/s, `log_heat` multiplies all walls' together; `log_closure` multiplies the eddy viscosity, `log_viscosity` on a coarse lattice.
+    coefficient in m/s, `log_heat` multiplies all walls' together; `log_closure` multiplies the eddy
+    viscosity, `log_viscosity` does so on a coarse lattice.
     """
 
     inlet_excess_k: Float[Array, " inlets"]
@@ -133,7 +134,9 @@ def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlan
     for opening in (*layout.inlets, *layout.outlets, *layout.heaters):
         if opening.wall == wall:
             closed = closed - jnp.asarray(opening.fraction, jnp.float32)
-    conductance = float(layout.heated[wall]) * closed * jnp.exp(parameters.log_heat + parameters.wall_log_heat[wall])
+    conductance = (
+        float(layout.heated[wall]) * closed * jnp.exp(parameters.log_heat + parameters.wall_log_heat[wall])
+    )
     heat = conductance * parameters.wall_excess_k[wall]
     for n, opening in enumerate(layout.heaters):
         if opening.wall == wall:

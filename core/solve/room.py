@@ -22,16 +22,22 @@ from core.room.grid import AXES
 from core.room.march import March, MarchSettings, march
 from core.room.model import Flow
 from core.room.observe import Observations, Prediction, observations
+from core.room.openings import stated_walls
 from core.room.prior import Prior, outflow_excess_k, room_prior
+from core.room.residue import temperature_correction
 from core.room.room import Room, carried_over, room, seen
-from core.room.setup import RoomParameters
+from core.room.sentences import balances, contradictions, misfit, undetermined
+from core.room.setup import RoomLayout, RoomParameters
 from core.scene import Inlet, Scene
 from core.setting import setting
+from core.uncertainty import Deviation, deviation
 
 Event = Callable[[dict[str, float]], None]
 
 # Steps of the finite differences, in prior deviations: beyond the march's own wobble, short of curvature.
 _DIFFERENCE = 0.5
+# Prior size of the temperature's last correction, as a share of the departure from the profile.
+CORRECTION_SHARE = 0.3
 
 
 @setting
@@ -42,6 +48,8 @@ class RoomSettings:
     coarse_cells: int = 32
     vertices: int = 64
     rounds: int = 2
+    coarse_rounds: int = 1
+    coarse_rounds_unknown: int = 2
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 45.0
@@ -72,29 +80,46 @@ def solve_room(
     scene = problem.scene
     closure = closure_name(scene)
     coarse, fine = (room(scene, n, closure) for n in (settings.coarse_cells, settings.cells))
-    vertices = (settings.vertices,) * 3
+    vertices = (settings.vertices, settings.vertices, settings.vertices)
     data = observations(problem, vertices)
     prior = room_prior(problem, coarse.layout, log_viscosity_std=settings.log_viscosity_std)
     vector = np.zeros(len(prior.active()))
     base = settled(coarse, prior, problem, settings, vertices, tell)
-    jacobian = perturbed(coarse, prior, base, settings, vertices)
+    for _ in range(coarse_rounds(scene, settings)):
+        runs = perturbed(coarse, prior, vector, base, settings, vertices)
+        # No second grid yet: half of the misfit is taken for the grid's.
+        half = 0.5 * (data.values()[0] - data.predicted(base.seen))
+        vector = corrected(vector, base, data, runs, half, trusting=True).vector
+        base = attempt(coarse, prior.parameters(vector), base.flow.last, settings.restart_s, vertices, tell)
+    jacobian = perturbed(coarse, prior, vector, base, settings, vertices)
     flow = carried_over(base.flow.last, coarse.grid, fine.grid)
-    best = attempt(fine, prior.parameters(vector), flow, settings.refine_s, vertices, tell)
+    best = first = attempt(fine, prior.parameters(vector), flow, settings.refine_s, vertices, tell)
     grid_difference = data.predicted(best.seen) - data.predicted(jacobian[0])
-    posterior = None
+    posterior: Posterior | None = None
     for n in range(settings.rounds if settings.use_images else 0):
         posterior = corrected(vector, best, data, jacobian, grid_difference)
         vector = posterior.vector
         seconds = settings.final_s if n == settings.rounds - 1 else settings.refine_s
         best = attempt(fine, prior.parameters(vector), best.flow.last, seconds, vertices, tell)
         tell({"round": n + 1.0, **fitted(prior, vector)})
-    return solution(problem, best, posterior, prior, time.perf_counter() - start_s)
+    posterior = posterior or Posterior(vector, np.eye(len(vector)), np.zeros(0))
+    solved = Solved(problem, data, prior, posterior, jacobian, first.seen, best, fine.layout)
+    return solution(solved, time.perf_counter() - start_s, use_images=settings.use_images)
 
 
 def closure_name(scene: Scene) -> str:
     """The closure that a scene asks for; `auto` and `learned` start from k-epsilon."""
     named = {"molecular": "molecular", "given": "constant", "zero_equation": "zero_equation"}
     return named.get(scene.flow.transport, "k_epsilon")
+
+
+def coarse_rounds(scene: Scene, settings: RoomSettings) -> int:
+    """Corrections of the coarse room: more where walls are unknown, none without data."""
+    if not settings.use_images:
+        return 0
+    stated = stated_walls(scene).values()
+    unknown = any(wall is None or wall.thermal == "unknown" for wall in stated)
+    return settings.coarse_rounds_unknown if unknown else settings.coarse_rounds
 
 
 def settled(
@@ -112,7 +137,7 @@ def settled(
 
 
 def first_profile_k(problem: Problem, coarse: Room) -> Float[np.ndarray, " nz"]:
-    """Excess temperature of each layer to start from: a plane's, else what leaves, else half of what comes."""
+    """Excess temperature of each layer to start from: a plane's, else what leaves, else half the supply's."""
     heights = coarse.grid.centres_m(2)
     ambient = problem.scene.air.ambient_temperature_k
     for plane in problem.planes:
@@ -145,7 +170,12 @@ def attempt(
 
 
 def perturbed(
-    where: Room, prior: Prior, base: Attempt, settings: RoomSettings, vertices: tuple[int, int, int]
+    where: Room,
+    prior: Prior,
+    vector: Float[np.ndarray, " active"],
+    base: Attempt,
+    settings: RoomSettings,
+    vertices: tuple[int, int, int],
 ) -> list[Prediction]:
     """The settled room again, first as it is and then with one parameter moved after the other."""
     steps = [np.zeros(len(prior.active())), *(np.eye(len(prior.active())) * _DIFFERENCE)]
@@ -153,7 +183,7 @@ def perturbed(
     def one(step: Float[np.ndarray, " active"]) -> Prediction:
         quiet: Event = lambda _: None  # noqa: E731
         return attempt(
-            where, prior.parameters(step), base.flow.last, settings.restart_s, vertices, quiet
+            where, prior.parameters(vector + step), base.flow.last, settings.restart_s, vertices, quiet
         ).seen
 
     with ThreadPoolExecutor(settings.threads) as pool:
@@ -166,13 +196,16 @@ def corrected(
     data: Observations,
     runs: list[Prediction],
     grid_difference: Float[np.ndarray, " data"],
+    *,
+    trusting: bool = False,
 ) -> Posterior:
     """One Gauss-Newton step from `vector` by the misfit of `best`."""
     values, variance, group = data.values()
     start = data.predicted(runs[0])
     jacobian = np.stack([(data.predicted(run) - start) / _DIFFERENCE for run in runs[1:]], axis=1)
     residual = values - data.predicted(best.seen)
-    return gauss_newton(vector, residual, weighted_variance(variance, group, residual, grid_difference), jacobian)
+    weights = weighted_variance(variance, group, residual, grid_difference)
+    return gauss_newton(vector, residual, weights, jacobian, trusting=trusting)
 
 
 def fitted(prior: Prior, vector: Float[np.ndarray, " active"]) -> dict[str, float]:
@@ -180,19 +213,87 @@ def fitted(prior: Prior, vector: Float[np.ndarray, " active"]) -> dict[str, floa
     return dict(zip(prior.names(), (float(v) for v in vector), strict=True))
 
 
-def solution(
-    problem: Problem, best: Attempt, posterior: Posterior | None, prior: Prior, seconds: float
-) -> Solution:
-    """The room as a result."""
-    n = best.seen.excess_k.shape
-    x, y, z = (np.linspace(problem.scene.room.lower_m[a], problem.scene.room.upper_m[a], n[a]) for a in AXES)
+class Solved(eqx.Module):
+    """Everything that a solve leaves behind: what a solution and its deviations are made of."""
+
+    problem: Problem
+    data: Observations
+    prior: Prior
+    posterior: Posterior
+    runs: list[Prediction]
+    first: Prediction
+    best: Attempt
+    layout: RoomLayout
+
+
+def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
+    """The room as a result, with the temperature's last correction, deviations and sentences."""
+    best, box, problem = solved.best, solved.problem.scene.room, solved.problem
+    values, _, _ = solved.data.values()
+    residual = values - solved.data.predicted(best.seen)
+    scales = [departure(best.seen.excess_k), departure(best.seen.pressure_m2_s2), rms(best.seen.velocity_m_s)]
+    change = temperature_correction(solved.data, best.seen.excess_k, residual, CORRECTION_SHARE * scales[0])
+    free = free_vertices(solved.layout, best.seen.excess_k.shape)
+    excess = best.seen.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
+    variances = (change.prior_variance_k2[:, None, :] * free, change.variance_k2[:, None, :] * free)
+    temperature = _deviation(solved, "excess_k", scales[0], variances)
+    pressure = _deviation(solved, "pressure_m2_s2", scales[1], (0.0, 0.0))
+    velocity = _deviation(solved, "velocity_m_s", scales[2], (0.0, 0.0))
+    x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(excess.shape))
     return Solution(
         x,
         y,
         z,
-        problem.scene.air.ambient_temperature_k + best.seen.excess_k,
+        problem.scene.air.ambient_temperature_k + excess,
         best.seen.pressure_m2_s2,
         best.seen.velocity_m_s,
+        temperature.std,
+        pressure.std,
+        velocity.std,
+        temperature.informed,
         outcome=best.flow.outcome,
         solver_s=seconds,
+        notes=tuple(sentences(solved, residual, values)),
     )
+
+
+def sentences(
+    solved: Solved, residual: Float[np.ndarray, " data"], values: Float[np.ndarray, " data"]
+) -> list[str]:
+    """Everything worth telling the operator."""
+    parameters = solved.best.parameters
+    inflow = float(np.sum(np.asarray(solved.layout.inflow_m3_s(parameters))))
+    return [
+        *solved.layout.notes,
+        *undetermined(solved.problem),
+        *contradictions(solved.problem, solved.prior, solved.posterior),
+        *misfit(solved.data, residual, values),
+        *balances(parameters, inflow, solved.best.seen.outflow_excess_k, solved.problem),
+    ]
+
+
+def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.ndarray, "vx vy vz"]:
+    """1 where a vertex is not on a wall of stated temperature."""
+    free = np.ones(shape)
+    for wall in np.flatnonzero(layout.held):
+        free[tuple((-1 if wall % 2 else 0) if a == wall // 2 else slice(None) for a in AXES)] = 0.0
+    return free
+
+
+def departure(field: Float[np.ndarray, "vx vy vz"]) -> float:
+    """Rms of a field's departure from its profile of height."""
+    return float(np.sqrt(np.mean((field - field.mean((0, 1))) ** 2)))
+
+
+def rms(field: Float[np.ndarray, "..."]) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(field))))
+
+
+def _deviation(
+    solved: Solved, name: str, scale: float, extra: tuple[np.ndarray | float, np.ndarray | float]
+) -> Deviation:
+    start = getattr(solved.runs[0], name)
+    moved = [(getattr(run, name) - start) / _DIFFERENCE for run in solved.runs[1:]]
+    between = getattr(solved.first, name) - start
+    return deviation(moved, solved.posterior.covariance, between, scale, extra)

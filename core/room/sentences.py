@@ -1,0 +1,98 @@
+"""What a fit says to the operator: balances, entries that the images contradict, and what to distrust."""
+
+import numpy as np
+from jaxtyping import Float
+
+from core.problem import Problem
+from core.room.fit import Posterior
+from core.room.observe import Observations
+from core.room.prior import Prior
+from core.room.setup import RoomParameters
+from core.scene import Heater, Inlet
+
+# An entry is contradicted when the fit moves it by this many of its stated deviations, and of its own.
+_SIGMAS = 2.0
+_POOR_FIT = 0.35
+
+
+def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list[str]:
+    """Sentences about entered values that the measurements do not believe."""
+    fitted = prior.parameters(posterior.vector)
+    moved = dict(zip(prior.names(), posterior.vector, strict=True))
+    own = dict(zip(prior.names(), np.sqrt(np.diag(posterior.covariance)), strict=True))
+    believed = {n for n, v in moved.items() if abs(v) > _SIGMAS and abs(v) > _SIGMAS * own[n]}
+    inlets = [b for b in problem.scene.boundary if isinstance(b, Inlet)]
+    heaters = [b for b in problem.scene.boundary if isinstance(b, Heater)]
+    said = []
+    for n, inlet in enumerate(inlets):
+        if f"inlet_excess_k[{n}]" in believed:
+            by_k = float(fitted.inlet_excess_k[n] - prior.mean.inlet_excess_k[n])
+            said.append(
+                f"The measurements say that inlet {n + 1} on {inlet.patch.wall} is "
+                f"{abs(by_k):.1f} K {'warmer' if by_k > 0 else 'colder'} than the "
+                f"{inlet.temperature_k:.2f} K entered. Check it."
+            )
+        if f"inlet_log_flow[{n}]" in believed:
+            factor = float(np.exp(fitted.inlet_log_flow[n]))
+            said.append(
+                f"The measurements say that inlet {n + 1} on {inlet.patch.wall} supplies {factor:.2f} "
+                "times the velocity entered. Check it."
+            )
+    for n, heater in enumerate(heaters):
+        if f"heater_excess_k[{n}]" in believed:
+            by_k = float(fitted.heater_excess_k[n] - prior.mean.heater_excess_k[n])
+            said.append(
+                f"The measurements say that the heater on {heater.patch.wall} is "
+                f"{abs(by_k):.1f} K {'warmer' if by_k > 0 else 'colder'} than the "
+                f"{heater.temperature_k:.2f} K entered. Check it."
+            )
+    if "log_closure" in believed:
+        said.append(
+            f"The measurements ask for {float(np.exp(fitted.log_closure)):.2f} times the closure's eddy "
+            "viscosity: another closure may describe this room better."
+        )
+    return said
+
+
+def misfit(
+    data: Observations, residual: Float[np.ndarray, " data"], values: Float[np.ndarray, " data"]
+) -> list[str]:
+    """A sentence on how much of the measured shifts the room explains, with a warning when it is little."""
+    shifts = data.values()[2] == 0
+    if not shifts.any():
+        return []
+    share = float(np.linalg.norm(residual[shifts]) / max(float(np.linalg.norm(values[shifts])), 1e-30))
+    said = [f"{100 * share:.0f} % (rms) of the measured shifts is left unexplained by the fitted room."]
+    if share > _POOR_FIT:
+        said.append(
+            "The closure or the stated boundary cannot explain these images: distrust the velocity. Check "
+            "inlets, outlets and heaters for something that is not in the scene."
+        )
+    return said
+
+
+def balances(
+    parameters: RoomParameters, inflow_m3_s: float, outflow_excess_k: float, problem: Problem
+) -> list[str]:
+    """Heat that comes with the supply and leaves through outlet and walls."""
+    if inflow_m3_s <= 0:
+        return []
+    flows = np.asarray(parameters.inlet_excess_k)
+    capacity_w_m3_k = problem.scene.air.density_kg_m3 * 1006.0
+    brought = capacity_w_m3_k * inflow_m3_s * float(flows.mean())
+    carried = capacity_w_m3_k * inflow_m3_s * outflow_excess_k
+    return [
+        f"Supply air brings {brought:.0f} W above ambient; {carried:.0f} W leave by the outlets and "
+        f"{brought - carried:.0f} W through walls and heaters. {3600 * inflow_m3_s:.0f} m3/h flow through."
+    ]
+
+
+def undetermined(problem: Problem) -> list[str]:
+    """What the stated information cannot determine."""
+    inlets = any(isinstance(b, Inlet | Heater) for b in problem.scene.boundary)
+    if inlets:
+        return []
+    return [
+        "No inlet or heater is stated: nothing says what drives the air. Velocity is not determined by these "
+        "measurements; the one given follows from the walls' plane alone."
+    ]
