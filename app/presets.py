@@ -8,6 +8,7 @@ from core.problem import Problem
 from core.result import Solution
 from core.solve.draft import solve_draft
 from core.solve.recipes import solve_grid_recipe, solve_paper
+from core.solve.room import RoomSettings, solve_room
 
 OnEvent = Callable[[dict[str, Any]], object]
 
@@ -20,10 +21,26 @@ class Solve(Protocol):
         ...
 
 
+STANDARD = RoomSettings()
+REFERENCE = RoomSettings(cells=64, coarse_cells=40, restart_s=80.0, final_s=90.0)
+
+
+def solve_standard(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+    """The room marched at 48^3, its boundary corrected by the images: minutes."""
+    return solve_room(problem, STANDARD, on_event=on_event)
+
+
+def solve_reference(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+    """The same at 64^3 and longer."""
+    return solve_room(problem, REFERENCE, on_event=on_event)
+
+
 PRESETS: Mapping[str, Solve] = {
     "draft": solve_draft,
     "grid": solve_grid_recipe,
     "paper": solve_paper,
+    "standard": solve_standard,
+    "reference": solve_reference,
 }
 
 

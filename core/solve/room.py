@@ -32,7 +32,7 @@ from core.scene import Inlet, Scene
 from core.setting import setting
 from core.uncertainty import Deviation, deviation
 
-Event = Callable[[dict[str, float]], None]
+Event = Callable[[dict[str, float]], object]
 
 # Steps of the finite differences, in prior deviations: beyond the march's own wobble, short of curvature.
 _DIFFERENCE = 0.5
@@ -47,8 +47,8 @@ class RoomSettings:
     cells: int = 48
     coarse_cells: int = 32
     vertices: int = 64
-    rounds: int = 2
-    coarse_rounds: int = 1
+    rounds: int = 3
+    coarse_rounds: int = 0
     coarse_rounds_unknown: int = 2
     settle_s: float = 150.0
     restart_s: float = 60.0
