@@ -15,7 +15,7 @@ from scipy import ndimage
 Field = Float[np.ndarray, "vx vy vz ..."]
 
 # Share of the two grids' difference, and floor as a share of the field's departure from its profile.
-_GRID_SHARE, _FLOOR_SHARE = 1.0, 0.15
+_GRID_SHARE, _FLOOR_SHARE = 0.7, 0.06
 _SMOOTH_VERTICES = 2.5
 
 

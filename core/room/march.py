@@ -66,7 +66,7 @@ def march(
     model: RoomModel,
     settings: MarchSettings,
     *,
-    on_window: Callable[[dict[str, float]], None] | None = None,
+    on_window: Callable[[dict[str, float]], object] | None = None,
 ) -> March:
     """The steady flow that `flow` settles to."""
     windows: list[Flow] = []

@@ -38,6 +38,7 @@ Event = Callable[[dict[str, float]], object]
 _DIFFERENCE = 0.5
 # Prior size of the temperature's last correction, as a share of the departure from the profile.
 CORRECTION_SHARE = 0.3
+PRESSURE_SCALE = 1.5
 
 
 @setting
@@ -76,7 +77,7 @@ def solve_room(
         SettingError: a boundary that cannot be (see `core.room.setup`).
     """
     start_s = time.perf_counter()
-    tell = on_event or (lambda _: None)
+    tell: Event = on_event or (lambda _: None)
     scene = problem.scene
     closure = closure_name(scene)
     coarse, fine = (room(scene, n, closure) for n in (settings.coarse_cells, settings.cells))
@@ -231,7 +232,12 @@ def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
     best, box, problem = solved.best, solved.problem.scene.room, solved.problem
     values, _, _ = solved.data.values()
     residual = values - solved.data.predicted(best.seen)
-    scales = [departure(best.seen.excess_k), departure(best.seen.pressure_m2_s2), rms(best.seen.velocity_m_s)]
+    # Pressure follows the level of T, which no departure shows.
+    scales = [
+        departure(best.seen.excess_k),
+        PRESSURE_SCALE * rms(best.seen.pressure_m2_s2),
+        rms(best.seen.velocity_m_s),
+    ]
     change = temperature_correction(solved.data, best.seen.excess_k, residual, CORRECTION_SHARE * scales[0])
     free = free_vertices(solved.layout, best.seen.excess_k.shape)
     excess = best.seen.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
@@ -281,7 +287,8 @@ def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.n
 
 
 def departure(field: Float[np.ndarray, "vx vy vz"]) -> float:
-    """Rms of a field's departure from its profile of height."""
+    """Rms of a field's departure from its profile of height, walls left out."""
+    field = field[1:-1, 1:-1, 1:-1]
     return float(np.sqrt(np.mean((field - field.mean((0, 1))) ** 2)))
 
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from core.geometry import Box, looking_along_y
-from core.room.closure import KEpsilonClosure
+from core.room.closure import ConstantClosure, KEpsilonClosure
 from core.room.grid import room_grid
 from core.room.level import layer_exchange_m3_s
 from core.room.march import advance_chunk
@@ -90,7 +90,7 @@ def test_layers_exchange_all_heat_that_is_not_lost():
     model = room_model(
         grid,
         walls,
-        KEpsilonClosure(jnp.float32(1.0), jnp.float32(1.5e-5)),
+        ConstantClosure(jnp.float32(1e-3), jnp.float32(1.5e-5)),
         buoyancy_m_s2_k=0.03,
         molecular_m2_s=1.5e-5,
     )
