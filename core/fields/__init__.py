@@ -1,6 +1,8 @@
 """Fields of excess refractivity: on a grid (trilinear, cubic), from a network, from a formula."""
 
 from core.fields.field import AbstractField as AbstractField
+from core.fields.field import Components as Components
+from core.fields.field import apart as apart
 from core.fields.formula import FunctionField as FunctionField
 from core.fields.grid import GridField as GridField
 from core.fields.plume import plume as plume

@@ -3,9 +3,10 @@
 from collections.abc import Callable
 
 import jax
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.fields.field import AbstractField
+from core.fields.field import AbstractField, Components, apart
 
 
 class FunctionField(AbstractField):
@@ -17,12 +18,7 @@ class FunctionField(AbstractField):
 
     function: Callable[[Float[Array, "3"]], Float[Array, ""]]
 
-    def excess(self, points_m: Float[Array, "points 3"]) -> Float[Array, " points"]:
-        """Value at each point."""
-        return jax.vmap(self.function)(points_m)
-
-    def excess_and_gradient(
-        self, points_m: Float[Array, "points 3"]
-    ) -> tuple[Float[Array, " points"], Float[Array, "points 3"]]:
-        """Value and gradient [1/m] at each point."""
-        return jax.vmap(jax.value_and_grad(self.function))(points_m)
+    def at(self, place_m: Components) -> tuple[Float[Array, " points"], Components]:
+        """Value and gradient [1/m]."""
+        value, gradient = jax.vmap(jax.value_and_grad(self.function))(jnp.stack(place_m, axis=-1))
+        return value, apart(gradient)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from core.fields.field import AbstractField
+from core.fields.field import AbstractField, Components
 from core.geometry import Vector3
 from core.setting import SettingError
 
@@ -44,35 +44,31 @@ class GridField(AbstractField):
         )
         return dx, dy, dz
 
-    def excess(self, points_m: Float[Array, "points 3"]) -> Float[Array, " points"]:
-        """Trilinear value at each point."""
-        return _interpolate(*self._cells(points_m))[0]
-
-    def excess_and_gradient(
-        self, points_m: Float[Array, "points 3"]
-    ) -> tuple[Float[Array, " points"], Float[Array, "points 3"]]:
+    def at(self, place_m: Components) -> tuple[Float[Array, " points"], Components]:
         """Trilinear value and the gradient of the interpolant."""
-        value, slopes = _interpolate(*self._cells(points_m))
-        per_m = jnp.asarray([1.0 / d for d in self.spacing_m], points_m.dtype)
-        return value, slopes * per_m[None]
-
-    def _cells(
-        self, points_m: Float[Array, "points 3"]
-    ) -> tuple[Float[Array, "points 2 2 2"], Float[Array, "points 3"]]:
-        """The corners of each point's cell and its place in the cell, 0 to 1."""
-        dtype = points_m.dtype
-        last = jnp.asarray([n - 2 for n in self.values.shape], jnp.int32)
-        lower = jnp.asarray(self.lower_m, dtype)
-        per_m = jnp.asarray([1.0 / d for d in self.spacing_m], dtype)
-        position = hold((points_m - lower[None]) * per_m[None], last + 1)
-        cell = jnp.clip(position.astype(jnp.int32), 0, last[None])
-        return gather_blocks(jnp.asarray(self.values).astype(dtype), cell, 2), position - cell.astype(dtype)
+        cells = [n - 1 for n in self.values.shape]
+        index, fraction = locate(place_m, self.lower_m, self.upper_m, cells)
+        corners = _corners(jnp.asarray(self.values).astype(fraction[0].dtype), index)
+        value, slopes = _interpolate(corners, fraction)
+        dx, dy, dz = self.spacing_m
+        return value, (slopes[0] / dx, slopes[1] / dy, slopes[2] / dz)
 
 
-def hold(position: Float[Array, "points 3"], last: Int[Array, "3"]) -> Float[Array, "points 3"]:
-    """The position, held at the outer faces; on a face its derivative is 1, where `clip` would give 1/2."""
-    end = last.astype(position.dtype)[None]
-    return jnp.where(position < 0.0, 0.0, jnp.where(position > end, end, position))
+def locate(
+    place_m: Components, lower_m: Vector3, upper_m: Vector3, cells: list[int]
+) -> tuple[Int[Array, "points 3"], Components]:
+    """Cell of each point and its place in the cell, 0 to 1, held at the outer faces.
+
+    On a face the place has derivative 1, where `clip` would give 1/2.
+    """
+    index, fraction = [], []
+    for p, low, high, count in zip(place_m, lower_m, upper_m, cells, strict=True):
+        position = (p - low) * (count / (high - low))
+        position = jnp.where(position < 0.0, 0.0, jnp.where(position > count, float(count), position))
+        cell = jnp.minimum(position.astype(jnp.int32), count - 1)
+        index.append(cell)
+        fraction.append(position - cell.astype(position.dtype))
+    return jnp.stack(index, axis=-1), (fraction[0], fraction[1], fraction[2])
 
 
 def gather_blocks(
@@ -83,16 +79,41 @@ def gather_blocks(
     return jax.lax.gather(values, first, numbers, (size, size, size), mode="promise_in_bounds")
 
 
+@jax.custom_vjp
+def _corners(
+    values: Float[Array, "nx ny nz"], index: Int[Array, "points 3"]
+) -> tuple[Float[Array, " points"], ...]:
+    """The eight corners of each cell, x slowest, z fastest; its transpose is one scatter of blocks."""
+    block = gather_blocks(values, index, 2)
+    return tuple(block[:, i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1))
+
+
+def _corners_forward(values: Array, index: Array) -> tuple[tuple[Array, ...], tuple[Array, Array]]:
+    return _corners(values, index), (values, index)
+
+
+def _corners_backward(kept: tuple[Array, Array], bars: tuple[Array, ...]) -> tuple[Array, None]:
+    values, index = kept
+    blocks = jnp.stack(bars, axis=-1).reshape(-1, 2, 2, 2)
+    numbers = jax.lax.ScatterDimensionNumbers((1, 2, 3), (), (0, 1, 2))
+    empty = jnp.zeros_like(values)
+    return jax.lax.scatter_add(empty, index, blocks, numbers, mode="promise_in_bounds"), None
+
+
+_corners.defvjp(_corners_forward, _corners_backward)
+
+
 def _interpolate(
-    corners: Float[Array, "points 2 2 2"], fraction: Float[Array, "points 3"]
-) -> tuple[Float[Array, " points"], Float[Array, "points 3"]]:
-    """Value and slopes per cell, blending the axes from the last to the first."""
-    fx, fy, fz = fraction[:, 0], fraction[:, 1], fraction[:, 2]
-    step_z = corners[..., 1] - corners[..., 0]
-    on_z = corners[..., 0] + fz[:, None, None] * step_z
-    step_y = on_z[..., 1] - on_z[..., 0]
-    on_yz = on_z[..., 0] + fy[:, None] * step_y
-    slope_z = step_z[..., 0] + fy[:, None] * (step_z[..., 1] - step_z[..., 0])
-    slope_x = on_yz[:, 1] - on_yz[:, 0]
-    slopes = [slope_x, *(s[:, 0] + fx * (s[:, 1] - s[:, 0]) for s in (step_y, slope_z))]
-    return on_yz[:, 0] + fx * slope_x, jnp.stack(slopes, axis=-1)
+    corners: tuple[Float[Array, " points"], ...], fraction: Components
+) -> tuple[Float[Array, " points"], Components]:
+    """Value and slopes per cell, blending z, then y, then x."""
+    fx, fy, fz = fraction
+    pairs = list(zip(corners[::2], corners[1::2], strict=True))
+    slope_z = [high - low for low, high in pairs]
+    on_z = [low + fz * step for (low, _), step in zip(pairs, slope_z, strict=True)]
+    slope_y = [on_z[1] - on_z[0], on_z[3] - on_z[2]]
+    on_y = [on_z[0] + fy * slope_y[0], on_z[2] + fy * slope_y[1]]
+    z_on_y = [a + fy * (b - a) for a, b in (slope_z[:2], slope_z[2:])]
+    slope_x = on_y[1] - on_y[0]
+    y, z = (low + fx * (high - low) for low, high in (slope_y, z_on_y))
+    return on_y[0] + fx * slope_x, (slope_x, y, z)

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.linalg import solve_banded
 
-from core.fields.field import AbstractField
-from core.fields.grid import gather_blocks, hold
+from core.fields.field import AbstractField, Components
+from core.fields.grid import gather_blocks, locate
 from core.geometry import Vector3
 
 
@@ -24,34 +24,22 @@ class SplineField(AbstractField):
     upper_m: Vector3 = eqx.field(static=True)
     coefficients: Float[Array, "nx_2 ny_2 nz_2"] | Float[np.ndarray, "nx_2 ny_2 nz_2"]
 
-    def excess(self, points_m: Float[Array, "points 3"]) -> Float[Array, " points"]:
-        """Value at each point."""
-        return self.excess_and_gradient(points_m)[0]
-
-    def excess_and_gradient(
-        self, points_m: Float[Array, "points 3"]
-    ) -> tuple[Float[Array, " points"], Float[Array, "points 3"]]:
-        """Value and gradient [1/m] at each point; outside the box the nearest face's."""
-        dtype = points_m.dtype
+    def at(self, place_m: Components) -> tuple[Float[Array, " points"], Components]:
+        """Value and gradient [1/m]; outside the box the nearest face's."""
         cells = [n - 3 for n in self.coefficients.shape]
-        size = [u - low for low, u in zip(self.lower_m, self.upper_m, strict=True)]
-        per_m = jnp.asarray([n / s for n, s in zip(cells, size, strict=True)], dtype)
-        last = jnp.asarray(cells, jnp.int32)
-        position = hold((points_m - jnp.asarray(self.lower_m, dtype)[None]) * per_m[None], last)
-        cell = jnp.clip(position.astype(jnp.int32), 0, last[None] - 1)
-        fraction = position - cell.astype(dtype)
-        block = gather_blocks(jnp.asarray(self.coefficients).astype(dtype), cell, 4)
-        weight, slope = _weights(fraction), _slopes(fraction)
-        value_z = jnp.einsum("pijk,pk->pij", block, weight[:, 2])
-        slope_z = jnp.einsum("pijk,pk->pij", block, slope[:, 2])
-        value_yz = jnp.einsum("pij,pj->pi", value_z, weight[:, 1])
-        gradient = [
-            jnp.einsum("pi,pi->p", value_yz, slope[:, 0]),
-            jnp.einsum("pij,pi,pj->p", value_z, weight[:, 0], slope[:, 1]),
-            jnp.einsum("pij,pi,pj->p", slope_z, weight[:, 0], weight[:, 1]),
-        ]
-        value = jnp.einsum("pi,pi->p", value_yz, weight[:, 0])
-        return value, jnp.stack(gradient, axis=-1) * per_m[None]
+        index, fraction = locate(place_m, self.lower_m, self.upper_m, cells)
+        block = gather_blocks(jnp.asarray(self.coefficients).astype(fraction[0].dtype), index, 4)
+        (wx, wy, wz), (sx, sy, sz) = (tuple(f(t) for t in fraction) for f in (_weights, _slopes))
+        value_z = jnp.einsum("pijk,pk->pij", block, wz)
+        slope_z = jnp.einsum("pijk,pk->pij", block, sz)
+        value_yz = jnp.einsum("pij,pj->pi", value_z, wy)
+        per_m = [n / (u - low) for n, low, u in zip(cells, self.lower_m, self.upper_m, strict=True)]
+        gradient = (
+            jnp.einsum("pi,pi->p", value_yz, sx) * per_m[0],
+            jnp.einsum("pij,pi,pj->p", value_z, wx, sy) * per_m[1],
+            jnp.einsum("pij,pi,pj->p", slope_z, wx, wy) * per_m[2],
+        )
+        return jnp.einsum("pi,pi->p", value_yz, wx), gradient
 
 
 def through_vertices(
@@ -74,13 +62,13 @@ def _solve(values: np.ndarray) -> np.ndarray:
     return np.concatenate([2 * inner[:1] - inner[1:2], inner, 2 * inner[-1:] - inner[-2:-1]])
 
 
-def _weights(t: Float[Array, "points 3"]) -> Float[Array, "points 3 4"]:
+def _weights(t: Float[Array, " points"]) -> Float[Array, "points 4"]:
     r = 1.0 - t
     inner = lambda s: (4.0 - 3.0 * s * s * (2.0 - s)) / 6.0  # noqa: E731
     return jnp.stack([r**3 / 6.0, inner(t), inner(r), t**3 / 6.0], axis=-1)
 
 
-def _slopes(t: Float[Array, "points 3"]) -> Float[Array, "points 3 4"]:
+def _slopes(t: Float[Array, " points"]) -> Float[Array, "points 4"]:
     r = 1.0 - t
     inner = lambda s: 0.5 * s * (3.0 * s - 4.0)  # noqa: E731
     return jnp.stack([-0.5 * r * r, inner(t), -inner(r), 0.5 * t * t], axis=-1)

@@ -11,6 +11,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from core.fields import Components, apart
 from core.geometry import Box
 
 
@@ -35,6 +36,12 @@ class Rays(eqx.Module):
     def on_wall(self) -> Array:
         """Whether the straight ray ends on the back wall."""
         return self.outcome == RayOutcome.wall
+
+
+def walk(rays: Rays, along_m: Float[Array, " rays"]) -> Components:
+    """Coordinates of the point `along_m` down each ray, component by component."""
+    (x, y, z), (dx, dy, dz) = apart(rays.entry_m), apart(rays.direction)
+    return x + along_m * dx, y + along_m * dy, z + along_m * dz
 
 
 def clip_ray(

@@ -3,13 +3,14 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PyTree
+from jaxtyping import Array, PyTree
 
-from core.fields import AbstractField
-from core.rays.bundle import Rays
+from core.fields import AbstractField, Components, apart
+from core.rays.bundle import Rays, walk
+from core.rays.sum_along import perturbed_part
 from core.rays.tracer import AbstractRayTracer, Bend, land
 
-State = tuple[Float[Array, "rays 3"], Float[Array, "rays 3"]]
+State = tuple[Components, Components]
 
 
 class NonlinearTracer(AbstractRayTracer):
@@ -30,31 +31,43 @@ class NonlinearTracer(AbstractRayTracer):
         """Trace every ray to the back wall."""
         scale = 1.0 / (1.0 + self.ambient_refractivity)
         start = (field.excess(rays.entry_m) * scale)[:, None] * rays.direction
-        deviation_m, turn = _leapfrog((rays, start, field), self.steps, scale)
+        ends = _leapfrog((rays, apart(start), field), self.steps, scale)
+        deviation_m, turn = (jnp.stack(e, axis=-1) for e in ends)
         return land(rays, turn, deviation_m, rays.direction + turn)
 
 
-def _force(inputs: PyTree, offset_m: Float[Array, "rays 3"], place: Array, scale: float) -> Array:
+def _force(inputs: PyTree, offset_m: Components, place: Array, scale: float) -> Components:
     """(1 + m) grad m a fraction `place` of the way along each ray, moved off it by `offset_m`."""
     rays, field = inputs
-    points_m = rays.entry_m + (place * rays.length_m)[:, None] * rays.direction + offset_m
-    excess, gradient = field.excess_and_gradient(points_m)
-    return gradient * (scale * (1.0 + scale * excess))[:, None]
+    x, y, z = (p + o for p, o in zip(walk(rays, place * rays.length_m), offset_m, strict=True))
+    excess, gradient = field.at((x, y, z))
+    strength = scale * (1.0 + scale * excess)
+    return gradient[0] * strength, gradient[1] * strength, gradient[2] * strength
+
+
+def _plus(a: Components, factor: Array | float, b: Components) -> Components:
+    """a + factor b."""
+    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
+
+
+def _dot(a: Components, b: Components) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @eqx.filter_custom_vjp
 def _leapfrog(inputs: PyTree, steps: int, scale: float) -> State:
     rays, start, field = inputs
-    step_m = (rays.length_m / steps)[:, None]
+    step_m = rays.length_m / steps
 
     def advance(state: State, index: Array) -> tuple[State, None]:
         deviation_m, turn = state
-        middle_m = deviation_m + 0.5 * step_m * turn
-        turn = turn + step_m * _force((rays, field), middle_m, (index + 0.5) / steps, scale)
-        return (middle_m + 0.5 * step_m * turn, turn), None
+        middle_m = _plus(deviation_m, 0.5 * step_m, turn)
+        turn = _plus(turn, step_m, _force((rays, field), middle_m, (index + 0.5) / steps, scale))
+        return (_plus(middle_m, 0.5 * step_m, turn), turn), None
 
-    places = jnp.arange(steps).astype(start.dtype)
-    return jax.lax.scan(advance, (jnp.zeros_like(start), start), places)[0]
+    places = jnp.arange(steps).astype(step_m.dtype)
+    rest = jax.tree.map(jnp.zeros_like, start)
+    return jax.lax.scan(advance, (rest, start), places)[0]
 
 
 @_leapfrog.def_fwd
@@ -68,31 +81,31 @@ def _leapfrog_backward(
     end: State, cotangent: PyTree, perturbed: PyTree, inputs: PyTree, steps: int, scale: float
 ) -> PyTree:
     """Retrace the steps from the end; a bar marks the loss's gradient in a quantity."""
-    rays, start, field = inputs
-    moving, still = eqx.partition((rays, field), eqx.is_inexact_array)
-    step_m = (rays.length_m / steps)[:, None]
+    rays, _, field = inputs
+    moving, still = perturbed_part((perturbed[0], perturbed[2]), (rays, field))
+    step_m = rays.length_m / steps
     # An output that the loss does not use has no cotangent.
     bars = eqx.combine(cotangent, jax.tree.map(jnp.zeros_like, end))
 
     def retreat(carry: PyTree, index: Array) -> tuple[PyTree, None]:
         (deviation_m, turn), (deviation_bar, turn_bar), step_bar, moving_bar = carry
-        middle_m = deviation_m - 0.5 * step_m * turn
+        middle_m = _plus(deviation_m, -0.5 * step_m, turn)
         force, pull_back = jax.vjp(
             lambda m, x: _force(eqx.combine(m, still), x, (index + 0.5) / steps, scale), moving, middle_m
         )
-        before = turn - step_m * force
-        turn_bar = turn_bar + 0.5 * step_m * deviation_bar
-        own_bar, middle_bar = pull_back(step_m * turn_bar)
-        middle_bar = middle_bar + deviation_bar
-        step_bar = step_bar + jnp.sum(
-            0.5 * turn * deviation_bar + force * turn_bar + 0.5 * before * middle_bar, axis=-1
-        )
-        turn_bar = turn_bar + 0.5 * step_m * middle_bar
-        state = (middle_m - 0.5 * step_m * before, before)
+        before = _plus(turn, -step_m, force)
+        turn_bar = _plus(turn_bar, 0.5 * step_m, deviation_bar)
+        own_bar, place_bar = pull_back(tuple(step_m * t for t in turn_bar))
+        middle_bar = _plus(deviation_bar, 1.0, place_bar)
+        step_bar = step_bar + 0.5 * _dot(turn, deviation_bar) + _dot(force, turn_bar)
+        step_bar = step_bar + 0.5 * _dot(before, middle_bar)
+        turn_bar = _plus(turn_bar, 0.5 * step_m, middle_bar)
+        state = (_plus(middle_m, -0.5 * step_m, before), before)
         return (state, (middle_bar, turn_bar), step_bar, jax.tree.map(jnp.add, moving_bar, own_bar)), None
 
-    carry = (end, bars, jnp.zeros_like(rays.length_m), jax.tree.map(jnp.zeros_like, moving))
-    places = jnp.arange(steps - 1, -1, -1).astype(start.dtype)
+    carry = (end, bars, jnp.zeros_like(step_m), jax.tree.map(jnp.zeros_like, moving))
+    places = jnp.arange(steps - 1, -1, -1).astype(step_m.dtype)
     _, (_, start_bar), step_bar, (rays_bar, field_bar) = jax.lax.scan(retreat, carry, places)[0]
-    rays_bar = eqx.tree_at(lambda r: r.length_m, rays_bar, rays_bar.length_m + step_bar / steps)
+    if rays_bar.length_m is not None:
+        rays_bar = eqx.tree_at(lambda r: r.length_m, rays_bar, rays_bar.length_m + step_bar / steps)
     return rays_bar, start_bar, field_bar

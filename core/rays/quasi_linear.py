@@ -1,10 +1,11 @@
 """The paper's tracer: the velocity from the straight path, the landing point from that velocity."""
 
 import equinox as eqx
-from jaxtyping import Array, Float, PyTree
+import jax.numpy as jnp
+from jaxtyping import Array, PyTree
 
-from core.fields import AbstractField
-from core.rays.bundle import Rays
+from core.fields import AbstractField, Components
+from core.rays.bundle import Rays, walk
 from core.rays.sum_along import sum_along
 from core.rays.tracer import AbstractRayTracer, Bend, land
 
@@ -24,19 +25,21 @@ class QuasiLinearTracer(AbstractRayTracer):
     def bend(self, rays: Rays, field: AbstractField) -> Bend:
         """Trace every ray to the back wall."""
         scale = 1.0 / (1.0 + self.ambient_refractivity)
-        turn, deviation_m = sum_along(_pull(self.steps, scale), (rays, field), self.steps)
+        sums = sum_along(_pull(self.steps, scale), (rays, field), self.steps)
+        turn, deviation_m = (jnp.stack(s, axis=-1) for s in sums)
         start = (field.excess(rays.entry_m) * scale)[:, None] * rays.direction
         turn = turn + start
         return land(rays, turn, deviation_m + start * rays.length_m[:, None], rays.direction + turn)
 
 
 def _pull(steps: int, scale: float):
-    def term(inputs: PyTree, index: Array) -> tuple[Float[Array, "rays 3"], Float[Array, "rays 3"]]:
+    def term(inputs: PyTree, index: Array) -> tuple[Components, Components]:
         rays, field = inputs
         step_m = rays.length_m / steps
         along_m = step_m * (index + 0.5)
-        excess, gradient = field.excess_and_gradient(rays.entry_m + along_m[:, None] * rays.direction)
-        turn = gradient * (scale * step_m * (1.0 + scale * excess))[:, None]
-        return turn, turn * (rays.length_m - along_m)[:, None]
+        excess, gradient = field.at(walk(rays, along_m))
+        lever_m = rays.length_m - along_m
+        x, y, z = (g * (scale * step_m * (1.0 + scale * excess)) for g in gradient)
+        return (x, y, z), (x * lever_m, y * lever_m, z * lever_m)
 
     return term

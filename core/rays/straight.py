@@ -1,10 +1,11 @@
 """The deflection integral along the straight ray."""
 
 import equinox as eqx
-from jaxtyping import Array, Float, PyTree
+import jax.numpy as jnp
+from jaxtyping import Array, PyTree
 
-from core.fields import AbstractField
-from core.rays.bundle import Rays
+from core.fields import AbstractField, Components
+from core.rays.bundle import Rays, walk
 from core.rays.sum_along import sum_along
 from core.rays.tracer import AbstractRayTracer, Bend, land
 
@@ -25,17 +26,19 @@ class StraightTracer(AbstractRayTracer):
     def bend(self, rays: Rays, field: AbstractField) -> Bend:
         """Trace every ray to the back wall."""
         scale = 1.0 / (1.0 + self.ambient_refractivity)
-        turn, deviation_m = sum_along(_pull(self.steps), (rays, field), self.steps)
-        return land(rays, turn * scale, deviation_m * scale, rays.direction)
+        sums = sum_along(_pull(self.steps), (rays, field), self.steps)
+        turn, deviation_m = (jnp.stack(s, axis=-1) * scale for s in sums)
+        return land(rays, turn, deviation_m, rays.direction)
 
 
 def _pull(steps: int):
-    def term(inputs: PyTree, index: Array) -> tuple[Float[Array, "rays 3"], Float[Array, "rays 3"]]:
+    def term(inputs: PyTree, index: Array) -> tuple[Components, Components]:
         rays, field = inputs
         step_m = rays.length_m / steps
         along_m = step_m * (index + 0.5)
-        _, gradient = field.excess_and_gradient(rays.entry_m + along_m[:, None] * rays.direction)
-        turn = gradient * step_m[:, None]
-        return turn, turn * (rays.length_m - along_m)[:, None]
+        _, gradient = field.at(walk(rays, along_m))
+        lever_m = rays.length_m - along_m
+        x, y, z = (g * step_m for g in gradient)
+        return (x, y, z), (x * lever_m, y * lever_m, z * lever_m)
 
     return term

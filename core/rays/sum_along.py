@@ -37,7 +37,7 @@ def _sum_forward(perturbed: PyTree, inputs: PyTree, term: Callable, steps: int) 
 def _sum_backward(
     _: None, cotangent: PyTree, perturbed: PyTree, inputs: PyTree, term: Callable, steps: int
 ) -> PyTree:
-    moving, still = eqx.partition(inputs, eqx.is_inexact_array)
+    moving, still = perturbed_part(perturbed, inputs)
     places = _places(inputs, steps)
     # An output that the loss does not use has no cotangent.
     bars = eqx.combine(cotangent, _zeros(inputs, term, places))
@@ -47,6 +47,12 @@ def _sum_backward(
         return jax.tree.map(jnp.add, total, pull_back(bars)[0]), None
 
     return jax.lax.scan(add, jax.tree.map(jnp.zeros_like, moving), places)[0]
+
+
+def perturbed_part(perturbed: PyTree, inputs: PyTree) -> tuple[PyTree, PyTree]:
+    """What is differentiated, and the rest: nothing is spent on gradients that nobody asked for."""
+    asked = jax.tree.map(lambda leaf, p: eqx.is_inexact_array(leaf) and bool(p), inputs, perturbed)
+    return eqx.partition(inputs, asked)
 
 
 def _places(inputs: PyTree, steps: int) -> Array:
