@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Float32, Shaped
 
+from calibration.lens import directions
 from core.geometry import Optics
 
 
@@ -70,34 +71,26 @@ def look(
     )
     pixels = np.stack([(x + dx).ravel(), (y + dy).ravel()], axis=1)
     shape = (camera.height_px, camera.width_px, samples**2)
-    directions = rays_of(camera, pixels)
+    towards = rays_of(camera, pixels)
     origin = np.array(camera.position_m)
     depth = np.full(len(pixels), np.inf)
     paint = np.zeros(len(pixels), np.float32)
     for sheet in sheets:
         distance, colour = _meet(
-            sheet, origin, directions, max(camera.focal_px), np.hypot(blur_px, 1 / (samples * np.sqrt(12)))
+            sheet, origin, towards, max(camera.focal_px), np.hypot(blur_px, 1 / (samples * np.sqrt(12)))
         )
         nearer = distance < depth
         depth[nearer], paint[nearer] = distance[nearer], colour[nearer]
     if projector is None:
         return Look(paint.reshape(shape), None)
-    points_m = origin + np.where(np.isfinite(depth), depth, 1.0)[:, None] * directions
+    points_m = origin + np.where(np.isfinite(depth), depth, 1.0)[:, None] * towards
     panel = _panel_px(projector, points_m).reshape(camera.height_px, -1, 2)
     return Look(paint.reshape(shape), panel)
 
 
 def rays_of(optics: Optics, pixels_px: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
     """World directions of pixels, with unit component along the optical axis."""
-    criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-12)
-    flat = cv2.undistortPoints(
-        np.ascontiguousarray(pixels_px, np.float64).reshape(-1, 1, 2),
-        _matrix(optics),
-        np.array(optics.distortion),
-        criteria=criteria,
-    )
-    flat = np.asarray(flat, float).reshape(-1, 2)
-    return np.concatenate([flat, np.ones((len(flat), 1))], axis=1) @ optics.rotation
+    return directions(_matrix(optics), np.array(optics.distortion), np.asarray(pixels_px)) @ optics.rotation
 
 
 def _meet(

@@ -8,20 +8,21 @@ effects, each by the derivative with the parameters and their joint covariance:
                 parameters the same turn moves it by 1 + error
 
 Placement matters where a rendered reference is compared with the captured one; the shift's relative error
-is all that remains where reference and flow are both captured. Derivatives by JAX in float64.
+is all that remains where reference and flow are both captured. Derivatives by central
+differences in float64.
 """
 
 from dataclasses import dataclass
 
-import jax
-import jax.numpy as jnp
+import cv2
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from calibration.bundle import OPTICS_PARAMETERS, Bundle
 from calibration.errors import BundleError
+from calibration.rehearsal import rays_of
+from calibration.world import shifted
 from core.geometry import Optics
-from core.rays.optics import Pinhole, pinhole
 
 _SIZE = len(OPTICS_PARAMETERS)
 
@@ -60,72 +61,91 @@ def shift_uncertainty(bundle: Bundle, camera: str | None = None, steps: int = 9)
         if seeing == bundle.cameras[0]:
             cross = lit.cross_covariance_matrix()
             covariance[_SIZE:, :_SIZE], covariance[:_SIZE, _SIZE:] = cross, cross.T
-    with jax.enable_x64(True):
-        placement, shift = _slopes(optics, lit.optics if lit else None, wall_y_m, pixels)
-    return ShiftUncertainty(pixels, _std(placement, covariance), _std(shift, covariance))
+    lamp = lit.optics if lit else None
+    placement = _placement_slopes(optics, lamp, wall_y_m, pixels)
+    shift = _shift_slopes(optics, wall_y_m, pixels)
+    return ShiftUncertainty(pixels, _std(placement, covariance), _std(shift, covariance[:_SIZE, :_SIZE]))
 
 
-def _slopes(
+def _placement_slopes(
     camera: Optics, projector: Optics | None, wall_y_m: float, pixels: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives (pixels, 2, parameters) of the pattern's place and of a 1 px shift along either axis."""
-    eye = pinhole(camera)
-    lamp = None if projector is None else pinhole(projector)
-    nothing = jnp.zeros(2 * _SIZE)
+) -> Float[np.ndarray, "pixels 2 parameters"]:
+    """How far the pattern's picture moves, by each parameter of camera and projector."""
+    if projector is None:
+        return np.zeros((len(pixels), 2, 2 * _SIZE))
 
-    def pattern(pixel: Array, change: Array) -> Array:
-        point = _wall_point(_changed(eye, change[:_SIZE]), pixel, wall_y_m)
-        return point[jnp.array([0, 2])] if lamp is None else _changed(lamp, change[_SIZE:]).project(point)
+    def panel(eye: Optics, lamp: Optics, at: np.ndarray) -> np.ndarray:
+        return _project(lamp, _wall_points(eye, at, wall_y_m))
 
-    def placement(pixel: Array) -> Array:
-        if lamp is None:
-            return jnp.zeros((2, 2 * _SIZE))
-        return jnp.linalg.solve(jax.jacfwd(pattern)(pixel, nothing), jax.jacfwd(pattern, 1)(pixel, nothing))
-
-    def shift(pixel: Array) -> Array:
-        middle = (eye.position_m + _wall_point(eye, pixel, wall_y_m)) / 2
-        unit = jnp.linalg.inv(_by_turn(eye, pixel, middle, wall_y_m))
-        moved = jax.jacfwd(lambda c: _by_turn(_changed(eye, c[:_SIZE]), pixel, middle, wall_y_m) @ unit)(
-            nothing
-        )
-        # The larger of the two axes' own errors stands for both: (axis, parameter) from the diagonal.
-        return jnp.stack([moved[0, 0], moved[1, 1]])
-
-    batch = jnp.asarray(pixels)
-    return np.asarray(jax.vmap(placement)(batch)), np.asarray(jax.vmap(shift)(batch))
-
-
-def _by_turn(eye: Pinhole, pixel: Array, middle: Array, wall_y_m: float) -> Float[Array, "2 2"]:
-    """Pixels that a wall point moves by, per turn [rad] of its ray at `middle` about two axes."""
-    direction = eye.direction(pixel)
-    across = jnp.stack([jnp.cross(direction, axis) for axis in jnp.eye(3)[jnp.array([2, 0])]])
-
-    def seen(turn: Array) -> Array:
-        bent = direction + turn @ across
-        point = middle + bent * (wall_y_m - middle[1]) / bent[1]
-        return eye.project(point)
-
-    return jax.jacfwd(seen)(jnp.zeros(2))
-
-
-def _wall_point(eye: Pinhole, pixel: Array, wall_y_m: float) -> Float[Array, "3"]:
-    direction = eye.direction(pixel)
-    return eye.position_m + direction * (wall_y_m - eye.position_m[1]) / direction[1]
-
-
-def _changed(optics: Pinhole, change: Float[Array, "15"]) -> Pinhole:
-    """The optics with their parameters changed, in the order of `OPTICS_PARAMETERS`."""
-    wx, wy, wz = change[9:12]
-    zero = jnp.zeros_like(wx)
-    turn = jnp.stack([zero, -wz, wy, wz, zero, -wx, -wy, wx, zero]).reshape(3, 3)
-    return Pinhole(
-        focal_px=optics.focal_px + change[:2],
-        principal_px=optics.principal_px + change[2:4],
-        position_m=optics.position_m + change[12:15],
-        rotation=optics.rotation + turn @ optics.rotation,
-        distortion=optics.distortion + change[4:9],
-        distorted=True,
+    by_pixel = np.stack(
+        [
+            (panel(camera, projector, pixels + d) - panel(camera, projector, pixels - d)) / 0.02
+            for d in 0.01 * np.eye(2)
+        ],
+        axis=2,
     )
+    columns = [
+        (panel(shifted(camera, d), projector, pixels) - panel(shifted(camera, -d), projector, pixels))
+        / (2 * s)
+        for d, s in _changes()
+    ]
+    columns += [
+        (panel(camera, shifted(projector, d), pixels) - panel(camera, shifted(projector, -d), pixels))
+        / (2 * s)
+        for d, s in _changes()
+    ]
+    return np.linalg.solve(by_pixel, np.stack(columns, axis=2))
+
+
+def _shift_slopes(
+    camera: Optics, wall_y_m: float, pixels: np.ndarray
+) -> Float[np.ndarray, "pixels 2 parameters"]:
+    """Relative change of each axis' shift, by each parameter of the camera."""
+    middles = (np.array(camera.position_m) + _wall_points(camera, pixels, wall_y_m)) / 2
+    unit = np.linalg.inv(_by_turn(camera, pixels, middles, wall_y_m))
+    columns = []
+    for d, s in _changes():
+        ends = [_by_turn(shifted(camera, sign * d), pixels, middles, wall_y_m) for sign in (1.0, -1.0)]
+        relative = (ends[0] - ends[1]) / (2 * s) @ unit
+        # The diagonal: what a shift along an axis errs by along itself.
+        columns.append(np.stack([relative[:, 0, 0], relative[:, 1, 1]], axis=1))
+    return np.stack(columns, axis=2)
+
+
+def _by_turn(
+    camera: Optics, pixels: np.ndarray, middles: np.ndarray, wall_y_m: float
+) -> Float[np.ndarray, "pixels 2 2"]:
+    """Pixels that the wall point moves by, per turn [rad] of the ray at its middle, about two axes."""
+    direction = rays_of(camera, pixels)
+    step_rad, columns = 1e-5, []
+    for axis in (np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])):
+        ends = []
+        for sign in (1.0, -1.0):
+            bent = direction + sign * step_rad * np.cross(direction, axis)
+            reach = (wall_y_m - middles[:, 1]) / bent[:, 1]
+            ends.append(_project(camera, middles + reach[:, None] * bent))
+        columns.append((ends[0] - ends[1]) / (2 * step_rad))
+    return np.stack(columns, axis=2)
+
+
+def _wall_points(camera: Optics, pixels: np.ndarray, wall_y_m: float) -> Float[np.ndarray, "pixels 3"]:
+    direction = rays_of(camera, pixels)
+    origin = np.array(camera.position_m)
+    return origin + direction * ((wall_y_m - origin[1]) / direction[:, 1])[:, None]
+
+
+def _project(optics: Optics, points_m: np.ndarray) -> Float[np.ndarray, "points 2"]:
+    (fx, fy), (cx, cy) = optics.focal_px, optics.principal_px
+    matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    local = (points_m - np.array(optics.position_m)) @ optics.rotation.T
+    pixels, _ = cv2.projectPoints(local, np.zeros(3), np.zeros(3), matrix, np.array(optics.distortion))
+    return np.asarray(pixels, float).reshape(-1, 2)
+
+
+def _changes() -> list[tuple[np.ndarray, float]]:
+    """A small change of each parameter alone, and its size."""
+    sizes = np.array([1e-2] * 4 + [1e-5] * 5 + [1e-6] * 3 + [1e-5] * 3)
+    return [(step * unit, float(step)) for step, unit in zip(sizes, np.eye(_SIZE), strict=True)]
 
 
 def _std(slopes: np.ndarray, covariance: np.ndarray) -> Float[np.ndarray, " pixels"]:

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float
 from calibration.adjustment import Device
 from calibration.errors import ImageError
 from calibration.graycode import Decoded
+from calibration.lens import directions
 from calibration.local import on_panel
 from calibration.stripes import EdgeMap
 
@@ -101,15 +102,7 @@ def _least_squares(points_m: Float[np.ndarray, "points 3"], inliers: Bool[np.nda
 
 def undistorted(device: Device, pixels_px: Float[np.ndarray, "points 2"]) -> Float[np.ndarray, "points 3"]:
     """Directions in the device's frame, with z = 1."""
-    criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-12)
-    flat = cv2.undistortPoints(
-        np.ascontiguousarray(pixels_px, np.float64).reshape(-1, 1, 2),
-        device.matrix,
-        device.intrinsics[4:],
-        criteria=criteria,
-    )
-    flat = np.asarray(flat, float).reshape(-1, 2)
-    return np.concatenate([flat, np.ones((len(flat), 1))], axis=1)
+    return directions(device.matrix, device.intrinsics[4:], np.asarray(pixels_px, float))
 
 
 def _consensus(points_m: Float[np.ndarray, "points 3"]) -> Bool[np.ndarray, " points"]:

@@ -12,12 +12,14 @@ from typing import Annotated
 import typer
 
 from app.calibrate import Pictures, Step, calibrate_camera, calibrate_projector, calibrate_wall
+from app.calibrate_response import calibrate_response, drift_between
 from app.calibration_folder import CalibrationFolder
 from app.calibration_summary import lines, summary
 from app.errors import AirlensError, BadInputError
 from calibration.board import Board, CharucoBoard, Chessboard, CircleGrid
 from calibration.errors import CalibrationError
 from calibration.record import Placement
+from calibration.strict import encode
 
 
 class BoardKind(StrEnum):
@@ -47,7 +49,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 def register(cli: typer.Typer) -> None:
     """Add `calibrate` and its subcommands."""
     calibrate = typer.Typer(no_args_is_help=True, help="Calibrate camera, projector, wall and response.")
-    for command in (camera, projector, wall):
+    for command in (camera, projector, wall, response, drift):
         calibrate.command()(command)
     cli.add_typer(calibrate, name="calibrate")
 
@@ -131,6 +133,69 @@ def wall(
     pictures = None if images is None else Pictures(images, pattern, full_scale(bits))
     placement = make_placement(folder, anchor, camera_at, wall_y, plumb)
     run(lambda say: calibrate_wall(folder, camera, pictures, level, placement, say), as_json)
+
+
+def response(
+    experiment: Folder,
+    images: Annotated[Path, typer.Option(help="Folder with dark, grey_<level>, exposure_<seconds>.")],
+    bits: Annotated[int, typer.Option(help="Bits of the camera.")],
+    camera: CameraName = "camera",
+    as_json: AsJson = False,
+) -> None:
+    """Measure dark level, gain, read noise, linearity, the projector's curve and the flat field."""
+    full_scale(bits)
+    bundle = calibrate_response(CalibrationFolder(experiment), camera, images, bits)
+    found = bundle.response(camera)
+    content = {"camera": encode(found), "projector": encode(bundle.projector_response)}
+    if as_json or found is None:
+        typer.echo(json.dumps(content, indent=1))
+        return
+    typer.echo(
+        f"{camera}: {found.gain_counts_per_e:.4g} ± {found.gain_std_counts_per_e:.2g} counts an electron, "
+        f"read noise {found.read_noise_e:.2f} e, full well {found.full_well_e:.0f} e, "
+        f"dark {found.dark_counts:.2f} counts, nonlinearity {100 * found.nonlinearity:.2f} %"
+    )
+    if bundle.projector_response is not None:
+        typer.echo(f"projector: gamma {bundle.projector_response.gamma:.3f}")
+    typer.echo("".join(f"- {advice}\n" for advice in found.quality.advice), nl=False)
+
+
+def drift(
+    reference: Annotated[Path, typer.Argument(help="Picture before.")],
+    flow: Annotated[Path, typer.Argument(help="Picture after.")],
+    border: Annotated[int, typer.Option(min=8, help="Width of the border that is compared [px].")] = 96,
+    marks: Annotated[
+        list[str] | None, typer.Option(help="Box of printed marks X0,Y0,X1,Y1; may be repeated.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure what moved between two exposures: camera and, with printed marks, projector apart."""
+    boxes = []
+    for text in marks or []:
+        x0, y0, x1, y1 = (int(v) for v in numbers(text, 4, "--marks", "10,10,120,120"))
+        boxes.append((x0, y0, x1, y1))
+    found = drift_between(reference, flow, border, tuple(boxes))
+    parts = {"total": found.total.motion, "projector": found.projector}
+    parts["camera"] = None if found.camera is None else found.camera.motion
+    content = {
+        name: None
+        if motion is None
+        else {
+            "shift_px": motion.shift_px.tolist(),
+            "rotation_rad": motion.rotation_rad,
+            "scale": motion.scale,
+        }
+        for name, motion in parts.items()
+    }
+    content |= {"shift_std_px": found.total.shift_std_px, "advice": list(found.advice)}
+    if as_json:
+        typer.echo(json.dumps(content, indent=1))
+        return
+    for name, motion in parts.items():
+        if motion is not None:
+            x, y = motion.shift_px
+            typer.echo(f"{name}: {x:+.4f}, {y:+.4f} px, {motion.rotation_rad * 1e6:+.1f} urad")
+    typer.echo("".join(f"- {advice}\n" for advice in found.advice), nl=False)
 
 
 def run(step: Callable[[Callable[[str], None]], Step], as_json: bool) -> None:

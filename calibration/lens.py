@@ -1,0 +1,30 @@
+"""From pixels to directions through Brown-Conrady distortion, by Newton's method.
+
+Our own, because OpenCV's interface to it differs between 4.x and 5 and its default stops at 5 iterations.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+_STEPS = 8
+
+
+def directions(
+    matrix: Float[np.ndarray, "3 3"], distortion: Float[np.ndarray, "5"], pixels_px: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, "n 3"]:
+    """Directions in the lens's own frame, with z = 1, of pixels (column, row)."""
+    seen = (pixels_px - matrix[:2, 2]) / matrix[[0, 1], [0, 1]]
+    k1, k2, p1, p2, k3 = distortion
+    x, y = seen.T.copy()
+    for _ in range(_STEPS if np.any(distortion) else 0):
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        slope = 2 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))
+        ex = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) - seen[:, 0]
+        ey = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y - seen[:, 1]
+        a = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
+        b = x * y * slope + 2 * p1 * x + 2 * p2 * y
+        d = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+        determinant = a * d - b * b
+        x, y = x - (d * ex - b * ey) / determinant, y - (a * ey - b * ex) / determinant
+    return np.stack([x, y, np.ones_like(x)], axis=1)
