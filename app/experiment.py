@@ -125,7 +125,7 @@ def new_id(parent: Path, stem: str) -> str:
 
 def finished(parent: Path) -> list[Path]:
     """Folders below `parent` that hold a manifest, oldest first."""
-    return sorted(path.parent for path in parent.glob("*/manifest.json"))
+    return sorted(path.parent for path in parent.glob("[!.]*/manifest.json"))
 
 
 def interrupted(parent: Path) -> list[Path]:

@@ -90,8 +90,8 @@ def _measure_view(
     # model leaves out there (clipping, aliasing), which biases a drift of 0.1 px by 1 %.
     variance = uniform_filter(variance, 2 * window_px)
     centres = window_centres(before.mean.shape, window_px)
-    in_room = sees_wall(scene, index, centres, margin_px=window_px)
-    border = ~sees_wall(scene, index, centres, margin_px=-window_px) & _whole(centres, before.mean.shape)
+    in_room = sees_wall(scene, index, centres, margin_px=float(window_px))
+    border = ~sees_wall(scene, index, centres, margin_px=-float(window_px)) & _whole(centres, before.mean.shape)
     if border.mean() < 0.01:
         shift = measure_shift(before.mean, after.mean, variance, window_px)
         note = "No part of the picture is free of the room's air: drift between exposures was not removed."

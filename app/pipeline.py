@@ -15,11 +15,13 @@ from app.durable import write_text
 from app.experiment import Experiment, new_id, open_experiment, write_manifest
 from app.measure import Measurement, measure, with_calibration
 from app.presets import preset as preset_called
+from app.presets import solve_with
 from app.provenance import provenance
 from app.report import write_report
 from app.results import write_result
 from app.shift_files import write_shifts
 from core.result import Solution
+from core.solve.checkpoint import CheckpointStore
 
 OnStage = Callable[[str], object]
 OnEvent = Callable[[dict[str, Any]], object]
@@ -41,8 +43,15 @@ def reconstruct(
     *,
     on_stage: OnStage = lambda stage: None,
     on_event: OnEvent | None = None,
+    into: Path | None = None,
+    store: CheckpointStore | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> Reconstruction:
-    """Reconstruct the newest captures of an experiment. Raises BadInputError, SettingError."""
+    """Reconstruct the newest captures of an experiment. Raises BadInputError, SettingError.
+
+    The result goes to a new folder among the experiment's results, or to `into`, which exists. A solver
+    that keeps checkpoints keeps them in `store` and ends soon after `should_stop` says so.
+    """
     started = time.perf_counter()
     solve = preset_called(preset)
     experiment = open_experiment(folder)
@@ -53,25 +62,31 @@ def reconstruct(
     on_stage("check the rendered reference against the captured one")
     checked = rendered_agreement(scene, measurement.references)
     on_stage(f"solve ({preset})")
-    solution = solve(measurement.problem, on_event=on_event)
+    solution = solve_with(solve, measurement.problem, on_event=on_event, store=store, should_stop=should_stop)
     on_stage("keep the result")
     assumed = (calibrated, *measurement.notes, checked, *solution.notes)
-    result = _keep(experiment, preset, measurement, solution, assumed, time.perf_counter() - started)
+    result = into or _new_folder(experiment, preset)
+    _keep(result, experiment, preset, measurement, solution, assumed, time.perf_counter() - started)
     on_stage("report")
     write_report(experiment.folder, result)
     return Reconstruction(result, solution, measurement, time.perf_counter() - started)
 
 
+def _new_folder(experiment: Experiment, preset: str) -> Path:
+    folder = experiment.results_folder / new_id(experiment.results_folder, preset)
+    folder.mkdir(parents=True)
+    return folder
+
+
 def _keep(
+    folder: Path,
     experiment: Experiment,
     preset: str,
     measurement: Measurement,
     solution: Solution,
     assumed: tuple[str, ...],
     wall_s: float,
-) -> Path:
-    folder = experiment.results_folder / new_id(experiment.results_folder, preset)
-    folder.mkdir(parents=True)
+) -> None:
     captures = {role: experiment.latest_capture(role) for role in ("reference", "flow")}
     write_result(
         folder / "result.nc",
@@ -97,4 +112,3 @@ def _keep(
         }
         | provenance({f"{role}_manifest": path / "manifest.json" for role, path in captures.items()}),
     )
-    return folder

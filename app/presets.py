@@ -1,5 +1,6 @@
 """Named ways to solve: what each costs and what it bought is in README, measured by `airlens bench`."""
 
+import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
@@ -50,3 +51,9 @@ def preset(name: str) -> Solve:
         return PRESETS[name]
     except KeyError:
         raise BadInputError(f"There is no preset {name!r}; known: {', '.join(PRESETS)}.") from None
+
+
+def solve_with(solve: Solve, problem: Problem, **given: Any) -> Solution:
+    """Solve, handing on what this solver takes of `on_event`, `store` and `should_stop`."""
+    taken = inspect.signature(solve).parameters
+    return solve(problem, **{name: value for name, value in given.items() if name in taken})

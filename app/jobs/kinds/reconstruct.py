@@ -1,0 +1,65 @@
+"""Kind `reconstruct`: the pipeline on the newest captures of an experiment, as `airlens reconstruct` runs it.
+
+The result is made in a hidden folder beside the experiment's results and put in place by one rename.
+A solver that keeps checkpoints goes on from its last one; another starts again.
+"""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from app.configuration import Strict, parse
+from app.jobs.checkpoints import FolderStore
+from app.jobs.task import Task
+
+EXPERIMENT = True
+
+
+class ReconstructSettings(Strict):
+    """What to solve with; the presets are listed by `airlens reconstruct --help`."""
+
+    preset: str = Field(default="draft", min_length=1, max_length=64, pattern="^[a-z0-9-]+$")
+
+
+def read(settings: Mapping[str, Any]) -> ReconstructSettings:
+    """Return the settings. Raises BadInputError."""
+    return parse(dict(settings), ReconstructSettings, source="the settings of a reconstruction")
+
+
+def target(order: Mapping[str, Any], folder: Path) -> Path:
+    """Return the place among the experiment's results: by the time of submission, so that names sort."""
+    moment = datetime.fromtimestamp(order["submitted_s"], UTC).strftime("%Y%m%dT%H%M%S")
+    preset = order["settings"].get("preset", "draft")
+    return Path(order["experiment"]) / "results" / f"{moment}-{preset}-{folder.name}"
+
+
+def run(task: Task, settings: ReconstructSettings) -> dict[str, Any]:
+    """Reconstruct; return how it ended."""
+    # Imported here: reading a job's settings must not cost the start of the array library.
+    from app.pipeline import reconstruct
+    from core.result import Outcome
+
+    def on_stage(stage: str) -> None:
+        task.check_stop()
+        task.tell("stage", {"stage": stage})
+
+    def on_event(row: Mapping[str, Any]) -> None:
+        numbers = {name: float(value) for name, value in row.items() if isinstance(value, int | float)}
+        step = int(numbers.pop("step", numbers.pop("iteration", 0)))
+        task.progress(step, int(numbers.pop("steps", 0)), numbers)
+
+    done = reconstruct(
+        task.experiment_folder(),
+        settings.preset,
+        on_stage=on_stage,
+        on_event=on_event,
+        into=task.output,
+        store=FolderStore(task.checkpoints),
+        should_stop=task.stop.is_set,
+    )
+    if done.solution.outcome is Outcome.stopped:
+        task.check_stop()
+    return {"preset": settings.preset, "outcome": done.solution.outcome.name}

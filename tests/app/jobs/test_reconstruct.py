@@ -1,0 +1,60 @@
+import threading
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from app import worker
+from app.cli import create_cli
+from app.errors import BadInputError
+from app.jobs import JobSpec, Ledger
+from app.jobs.folder import JobFolder, Owner
+from app.jobs.task import StoppedError
+from app.pipeline import reconstruct
+from app.results import read_result
+
+
+@pytest.fixture(scope="module")
+def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("rig") / "experiment"
+    with (files("app.sample") / "room.npz").open() as truth:
+        options = ["--truth", truth.name, "--camera-px", "160", "--frames", "2"]
+    done = CliRunner().invoke(create_cli(), ["simulate", str(folder), *options], catch_exceptions=False)
+    assert done.exit_code == 0
+    return folder
+
+
+def begun(ledger: Ledger, experiment: Path) -> tuple[JobFolder, Owner]:
+    job = ledger.submit(JobSpec(kind="reconstruct", experiment=experiment))
+    folder, owner = JobFolder(ledger.folder_of(job.id)), Owner(1, "first")
+    folder.hand_over(owner)
+    return folder, owner
+
+
+def test_a_job_gives_the_result_of_the_pipeline_bit_for_bit(experiment: Path, tmp_path: Path):
+    directly = reconstruct(experiment, "draft").solution
+    folder, owner = begun(Ledger(tmp_path), experiment)
+
+    worker.compute(folder, owner, threading.Event())
+
+    found = read_result(folder.target() / "result.nc")
+    assert found.temperature_k.tobytes() == directly.temperature_k.tobytes()
+    assert folder.target().parent == experiment / "results"
+    assert folder.target().name in (folder.target() / "report.html").read_text()
+    assert [path for path in (experiment / "results").iterdir() if path.name.startswith(".")] == []
+
+
+def test_a_stopped_job_leaves_no_result_and_an_order_without_experiment_is_refused(
+    experiment: Path, tmp_path: Path
+):
+    ledger, stop = Ledger(tmp_path), threading.Event()
+    folder, owner = begun(ledger, experiment)
+    stop.set()
+    with pytest.raises(StoppedError):
+        worker.compute(folder, owner, stop)
+    assert not folder.is_published()
+    with pytest.raises(BadInputError, match="works on an experiment"):
+        ledger.submit(JobSpec(kind="reconstruct"))
+    with pytest.raises(BadInputError, match="holds no experiment"):
+        ledger.submit(JobSpec(kind="reconstruct", experiment=tmp_path))
