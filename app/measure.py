@@ -91,7 +91,9 @@ def _measure_view(
     variance = uniform_filter(variance, 2 * window_px)
     centres = window_centres(before.mean.shape, window_px)
     in_room = sees_wall(scene, index, centres, margin_px=float(window_px))
-    border = ~sees_wall(scene, index, centres, margin_px=-float(window_px)) & _whole(centres, before.mean.shape)
+    border = ~sees_wall(scene, index, centres, margin_px=-float(window_px)) & _whole(
+        centres, before.mean.shape
+    )
     if border.mean() < 0.01:
         shift = measure_shift(before.mean, after.mean, variance, window_px)
         note = "No part of the picture is free of the room's air: drift between exposures was not removed."

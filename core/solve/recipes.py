@@ -6,6 +6,7 @@ from typing import Any
 from core.mlp import MlpSettings
 from core.problem import Problem
 from core.result import Solution
+from core.solve.checkpoint import CheckpointStore
 from core.solve.grid import GridSettings, solve_grid
 from core.solve.loop import LoopSettings
 from core.solve.mlp import MlpSolveSettings, solve_mlp
@@ -27,11 +28,17 @@ def solve_grid_recipe(problem: Problem, *, on_event: OnEvent | None = None) -> S
     return solve_grid(problem, settings, on_event=on_event)
 
 
-def solve_paper(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+def solve_paper(
+    problem: Problem,
+    *,
+    on_event: OnEvent | None = None,
+    store: CheckpointStore | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Solution:
     """The paper's recipe: AdaBelief, 80,000 iterations, batches of 8192, 5000 and 4096, 64 vertices."""
     settings = MlpSolveSettings(
         regime=regime_for(problem),
         network=MlpSettings(hidden_layers=4, width=128),
         loop=LoopSettings(steps=80_000, patience=80_000),
     )
-    return solve_mlp(problem, settings, on_event=on_event)
+    return solve_mlp(problem, settings, on_event=on_event, store=store, should_stop=should_stop)

@@ -162,7 +162,7 @@ def prior_temperature(problem: Problem, grid: VertexGrid) -> Volume:
 
 def _excess(air: Air, excess_k: np.ndarray) -> np.ndarray:
     """`Air.excess_refractivity` in float64, whatever JAX is set to."""
-    return -air.ambient_refractivity * excess_k / (air.ambient_temperature_k + excess_k)
+    return np.asarray(-air.ambient_refractivity * excess_k / (air.ambient_temperature_k + excess_k))
 
 
 def data_weight(shift: ShiftMeasurement, representation: float) -> Float[np.ndarray, "windows 2 2"]:

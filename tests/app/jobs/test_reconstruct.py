@@ -33,7 +33,7 @@ def begun(ledger: Ledger, experiment: Path) -> tuple[JobFolder, Owner]:
 
 
 def test_a_job_gives_the_result_of_the_pipeline_bit_for_bit(experiment: Path, tmp_path: Path):
-    directly = reconstruct(experiment, "draft").solution
+    directly = read_result(reconstruct(experiment, "draft").folder / "result.nc")
     folder, owner = begun(Ledger(tmp_path), experiment)
 
     worker.compute(folder, owner, threading.Event())
