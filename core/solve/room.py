@@ -38,7 +38,7 @@ Event = Callable[[dict[str, float]], object]
 _DIFFERENCE = 0.5
 # Prior size of the temperature's last correction, as a share of the departure from the profile.
 CORRECTION_SHARE = 0.3
-PRESSURE_SCALE = 1.5
+PRESSURE_SCALE = 0.8
 
 
 @setting
@@ -303,4 +303,7 @@ def _deviation(
     start = getattr(solved.runs[0], name)
     moved = [(getattr(run, name) - start) / _DIFFERENCE for run in solved.runs[1:]]
     between = getattr(solved.first, name) - start
+    if solved.data.planes and between.ndim == 3:
+        # The profile of height is measured by the plane; only departures from it are the grid's.
+        between = between - between.mean((0, 1))
     return deviation(moved, solved.posterior.covariance, between, scale, extra)

@@ -1,0 +1,130 @@
+"""airlens bench room: the room solver against published cavities, with what each cost.
+
+Differentially heated square (de Vahl Davis 1983): mean Nusselt number, from two grids by Richardson's
+extrapolation of second order. Lid-driven square (Ghia, Ghia and Shin 1982): the smallest u on the vertical
+centre line. Both two-dimensional: two cells deep between free walls.
+"""
+
+import json
+import time
+from typing import Annotated
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import typer
+
+from core.room.boundary import Boundary, WallPlane, closed_room
+from core.room.closure import ConstantClosure
+from core.room.grid import RoomGrid
+from core.room.march import MarchSettings, march
+from core.room.model import RoomModel, air_at_rest, room_model
+
+PUBLISHED_NUSSELT = {1e4: 2.243, 1e5: 4.519, 1e6: 8.800}
+PUBLISHED_LEAST_U = {100.0: -0.21090, 400.0: -0.32726, 1000.0: -0.38289}
+_CELLS = {1e4: 16, 1e5: 32, 1e6: 64, 100.0: 32, 400.0: 48, 1000.0: 64}
+_PRANDTL = 0.71
+
+
+def register(bench: typer.Typer) -> None:
+    """Add the command."""
+
+    @bench.command()
+    def room(
+        fine: Annotated[int, typer.Option(help="Multiplies every grid's cells along an edge.")] = 1,
+        as_json: Annotated[bool, typer.Option("--json")] = False,
+    ) -> None:
+        """Heated and lid-driven cavities against published values."""
+        rows = [heated_row(ra, _CELLS[ra] * fine) for ra in PUBLISHED_NUSSELT]
+        rows += [driven_row(re, _CELLS[re] * fine) for re in PUBLISHED_LEAST_U]
+        for row in rows:
+            typer.echo(json.dumps(row) if as_json else _sentence(row))
+
+
+def heated_row(rayleigh: float, cells: int) -> dict[str, float | str]:
+    """Nusselt number on `cells` and 3/2 of them, extrapolated."""
+    start_s = time.process_time()
+    coarse, fine = nusselt(rayleigh, cells), nusselt(rayleigh, cells * 3 // 2)
+    found = fine + (fine - coarse) / ((3 / 2) ** 2 - 1)
+    return _row("nusselt", rayleigh, cells * 3 // 2, found, PUBLISHED_NUSSELT[rayleigh], start_s)
+
+
+def driven_row(reynolds: float, cells: int) -> dict[str, float | str]:
+    """Smallest u on the centre line on `cells` and 3/2 of them, extrapolated."""
+    start_s = time.process_time()
+    coarse, fine = least_u(reynolds, cells), least_u(reynolds, cells * 3 // 2)
+    found = fine + (fine - coarse) / ((3 / 2) ** 2 - 1)
+    return _row("least u", reynolds, cells * 3 // 2, found, PUBLISHED_LEAST_U[reynolds], start_s)
+
+
+def nusselt(rayleigh: float, cells: int) -> float:
+    """Mean Nusselt number of the hot wall, in free-fall units (L = dT = g beta = 1)."""
+    diffusivity = 1.0 / np.sqrt(rayleigh * _PRANDTL)
+
+    def at(wall: WallPlane, excess_k: float) -> WallPlane:
+        full = jnp.ones_like(wall.normal_m_s)
+        return eqx.tree_at(
+            lambda w: (w.conductance_m_s, w.wall_excess_k),
+            wall,
+            (full * (2.0 * cells * diffusivity), full * excess_k),
+        )
+
+    grid, bare = _square(cells)
+    x, y, z = bare.walls
+    boundary = Boundary(((at(x[0], 0.5), at(x[1], -0.5)), y, z))
+    model = _model(grid, boundary, _PRANDTL * diffusivity, 1.0)
+    profile = jnp.asarray(np.broadcast_to((0.5 - grid.centres_m(0))[:, None, None], grid.cells), jnp.float32)
+    settings = MarchSettings(longest_s=120.0, tolerance=2e-4, level_ahead_s=0.0)
+    end = march(air_at_rest(model, profile, 0.1), model, settings)
+    return float(jnp.mean(0.5 - end.mean.excess_k[0])) * 2 * cells
+
+
+def least_u(reynolds: float, cells: int) -> float:
+    """Smallest u on the vertical centre line, in lid speeds; a parabola through the three lowest cells."""
+    grid, bare = _square(cells)
+    x, y, z = bare.walls
+    lid = eqx.tree_at(lambda w: w.tangent_m_s[0], z[1], jnp.ones_like(z[1].normal_m_s))
+    model = _model(grid, Boundary((x, y, (z[0], lid))), 1.0 / reynolds, 0.0)
+    settings = MarchSettings(longest_s=100.0, tolerance=3e-4, level_ahead_s=0.0)
+    end = march(air_at_rest(model, jnp.zeros(grid.cells), 0.1), model, settings)
+    line = np.asarray(end.last.velocity[0])[cells // 2, 0]
+    k = int(line.argmin())
+    below, lowest, above = (float(line[i]) for i in (k - 1, k, k + 1))
+    return lowest - (above - below) ** 2 / (8.0 * (above + below - 2.0 * lowest))
+
+
+def _square(cells: int) -> tuple[RoomGrid, Boundary]:
+    """A unit square in x and z, two cells deep between free walls."""
+    edge = 1.0 / cells
+    grid = RoomGrid(cells=(cells, 2, cells), lower_m=(0.0, 0.0, 0.0), spacing_m=(edge, edge, edge))
+    x, y, z = closed_room(grid).walls
+    low, high = (eqx.tree_at(lambda w: w.grip, wall, jnp.float32(0.0)) for wall in y)
+    return grid, Boundary((x, (low, high), z))
+
+
+def _model(grid: RoomGrid, boundary: Boundary, viscosity_m2_s: float, buoyancy: float) -> RoomModel:
+    closure = ConstantClosure(jnp.float32(0.0), jnp.float32(viscosity_m2_s))
+    return room_model(
+        grid, boundary, closure, buoyancy_m_s2_k=buoyancy, molecular_m2_s=viscosity_m2_s, prandtl=_PRANDTL
+    )
+
+
+def _row(
+    what: str, number: float, cells: int, found: float, published: float, start_s: float
+) -> dict[str, float | str]:
+    return {
+        "what": what,
+        "number": number,
+        "cells": cells,
+        "found": found,
+        "published": published,
+        "relative_error": found / published - 1.0,
+        "cpu_s": time.process_time() - start_s,
+    }
+
+
+def _sentence(row: dict[str, float | str]) -> str:
+    return (
+        f"{row['what']:8s} at {row['number']:9.0f}, {row['cells']} cells: {row['found']:.4f}, published "
+        f"{row['published']:.4f}, error {100 * float(row['relative_error']):+.2f} %, {row['cpu_s']:.0f} CPU s"
+    )
