@@ -10,6 +10,7 @@ import argparse
 import asyncio
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -135,6 +136,9 @@ def main() -> None:
                 other.join()
                 found |= {"job_alone_s": round(alone_s, 2), "job_beside_s": round(job[0], 2)}
             found["load_average"] = round(os.getloadavg()[0], 1)
+            service.terminate()
+            service.wait()
+            found["service_cpu_s"] = round(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, 1)
             print(json.dumps({"clients": options.clients, "viewers": options.viewers, **found}))
         finally:
             service.terminate()

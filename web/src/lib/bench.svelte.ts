@@ -168,6 +168,9 @@ class Bench {
     if (!has("reference")) return step("Take the reference", "Capture", () => this.capture("reference", 100));
     if (!has("flow")) return step("Take the flow", "Capture", () => this.capture("flow", 100));
     if (job) return step(`Reconstructing: ${Math.round(100 * job.progress)} %`, "Reconstruct", nothing, true);
+    const last = this.jobs.find((one) => one.experiment === this.experiment);
+    if (!this.result && last && ["failed", "cancelled"].includes(last.state))
+      return step("Retry the reconstruction", "Reconstruct", () => this.act(last, "retry"));
     if (!this.result) return step("Reconstruct a draft", "Reconstruct", () => this.reconstruct("draft"));
     if (this.page !== "Look") return step("Look at the result", "Look", nothing);
     return step("Export NetCDF", "Look", () => this.export("nc"));
