@@ -123,7 +123,7 @@ class Client:
     def create_experiment(
         self,
         title: str = "Simulated room",
-        camera_px: int = 512,
+        camera_px: int = 384,
         light: Literal["texture", "projector"] = "texture",
         boundary: Literal["paper", "operator", "surveyed"] = "surveyed",
     ) -> ExperimentResource:

@@ -23,7 +23,7 @@ class Rehearsal:
     """What to simulate; a small camera keeps every step within seconds."""
 
     title: str = "Simulated room"
-    camera_px: int = 512
+    camera_px: int = 384
     light: Literal["texture", "projector"] = "texture"
     information: Information = "surveyed"
 

@@ -39,7 +39,7 @@ class NewExperiment(Strict):
 
     kind: Literal["simulated"]
     title: str = Field(default="Simulated room", min_length=1, max_length=200)
-    camera_px: int = Field(default=512, ge=64, le=4096)
+    camera_px: int = Field(default=384, ge=64, le=4096)
     light: Literal["texture", "projector"] = "texture"
     boundary: Literal["paper", "operator", "surveyed"] = "surveyed"
 

@@ -52,7 +52,8 @@ export class LivePicture {
     const jpeg = new Blob([new Uint8Array(message, 4 + length)], { type: "image/jpeg" });
     try {
       const picture = await createImageBitmap(jpeg);
-      this.show({ numbers: JSON.parse(text) as LiveNumbers, picture });
+      // A frame that was on its way when the page was left has no place any more.
+      if (!this.closed) this.show({ numbers: JSON.parse(text) as LiveNumbers, picture });
       picture.close();
     } finally {
       this.ask(1);
