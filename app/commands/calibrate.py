@@ -14,6 +14,7 @@ import typer
 from app.calibrate import Pictures, Step, calibrate_camera, calibrate_projector, calibrate_wall
 from app.calibrate_response import calibrate_response, drift_between
 from app.calibration_folder import CalibrationFolder
+from app.calibration_page import write_page
 from app.calibration_summary import lines, summary
 from app.errors import AirlensError, BadInputError
 from calibration.board import Board, CharucoBoard, Chessboard, CircleGrid
@@ -49,7 +50,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 def register(cli: typer.Typer) -> None:
     """Add `calibrate` and its subcommands."""
     calibrate = typer.Typer(no_args_is_help=True, help="Calibrate camera, projector, wall and response.")
-    for command in (camera, projector, wall, response, drift):
+    for command in (camera, projector, wall, response, drift, page):
         calibrate.command()(command)
     cli.add_typer(calibrate, name="calibrate")
 
@@ -196,6 +197,11 @@ def drift(
             x, y = motion.shift_px
             typer.echo(f"{name}: {x:+.4f}, {y:+.4f} px, {motion.rotation_rad * 1e6:+.1f} urad")
     typer.echo("".join(f"- {advice}\n" for advice in found.advice), nl=False)
+
+
+def page(experiment: Folder, camera: CameraName = "camera") -> None:
+    """Write the calibration's figures and advice as one HTML file."""
+    typer.echo(write_page(CalibrationFolder(experiment), camera))
 
 
 def run(step: Callable[[Callable[[str], None]], Step], as_json: bool) -> None:

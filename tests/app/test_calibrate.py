@@ -73,6 +73,13 @@ def test_camera_then_projector_from_a_folder(pictures, tmp_path):
     assert bundle.projector.cross_covariance is not None
     assert len(bundle.images) == 4
 
+    page = run("page", tmp_path)
+    assert page.exit_code == 0, page.output
+    written = (tmp_path / "calibration" / "calibration.html").read_text()
+    # Two figures without a wall: the camera's and the projector's residuals.
+    assert written.count("data:image/png;base64,") == 2
+    assert "4 views; take 8 to 20" in written
+
 
 def test_missing_swapped_and_odd_frames_are_named_and_the_rest_is_kept(pictures, tmp_path):
     images = tmp_path / "images"
