@@ -79,8 +79,8 @@ def _residuals(fit: Intrinsics, size_px: tuple[int, int]) -> Figure:
     axes.imshow(np.where(seen, 1.0, 0.85), extent=extent, cmap="gray", vmin=0, vmax=1, aspect="equal")
     pixels = np.concatenate([s.pixels_px for s in fit.sightings])
     left = np.concatenate(fit.adjusted.residuals_px)
-    # Half a percent of the picture's width stands for the rms.
-    enlarge = 0.005 * size_px[0] / max(fit.rms_px, 1e-9)
+    # Two percent of the picture's width stands for the rms.
+    enlarge = 0.02 * size_px[0] / max(fit.rms_px, 1e-9)
     arrows = axes.quiver(
         *pixels.T, *(left * enlarge).T, np.linalg.norm(left, axis=1),
         angles="xy", scale_units="xy", scale=1, width=0.002, cmap="viridis",
