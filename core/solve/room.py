@@ -38,7 +38,7 @@ Event = Callable[[dict[str, float]], object]
 _DIFFERENCE = 0.5
 # Prior size of the temperature's last correction, as a share of the departure from the profile.
 CORRECTION_SHARE = 0.3
-PRESSURE_SCALE = 0.8
+PRESSURE_SCALE = 1.6
 
 
 @setting
@@ -163,10 +163,17 @@ def attempt(
     vertices: tuple[int, int, int],
     tell: Event,
 ) -> Attempt:
-    """March `flow` under these parameters and look at its mean."""
+    """March `flow` under these parameters and look at its mean; seconds are those of the reference room."""
     model = where.model(parameters)
     flow = eqx.tree_at(lambda f: f.velocity, flow, set_normal(flow.velocity, model.boundary))
-    done = march(flow, model, MarchSettings(longest_s=seconds, settle_s=0.15 * seconds), on_window=tell)
+    pace = where.pace
+    timing = MarchSettings(
+        longest_s=seconds * pace,
+        window_s=min(5.0, seconds) * pace,
+        settle_s=0.15 * seconds * pace,
+        level_ahead_s=20.0 * pace,
+    )
+    done = march(flow, model, timing, on_window=tell)
     return Attempt(parameters, done, seen(done.mean, model, vertices))
 
 
