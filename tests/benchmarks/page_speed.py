@@ -27,6 +27,10 @@ from drivers.simulated import SimulatedCamera
 from tests.browser.conftest import CHROMIUM, FLAGS, Station
 
 POINTS = 80_000
+FINISH = """canvas => {
+  const gl = canvas.getContext("webgl2");
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+}"""
 
 
 def tell(what: str, **numbers: Any) -> None:
@@ -74,8 +78,13 @@ def volume(page: Page) -> None:
     slider = page.locator("input[type=range]").last
     times_ms = []
     for _ in range(12):
+        began_s = time.perf_counter()
         slider.press("ArrowRight")
-        times_ms.append(float(place.get_attribute("data-frame-ms") or "nan"))
+        # Reading a pixel waits until the frame is really drawn; the way there and back is counted too.
+        page.locator(".volume canvas").evaluate(FINISH)
+        there_and_back_ms = 1000 * (time.perf_counter() - began_s)
+        # Whichever is longer: the page's own clock around the rendering, or this one until a pixel is read.
+        times_ms.append(max(there_and_back_ms, float(place.get_attribute("data-frame-ms") or "nan")))
     tell("volume", edge=64, frame_ms=round(float(np.median(times_ms[2:])), 1))
 
 
