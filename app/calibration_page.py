@@ -24,15 +24,11 @@ from core.geometry import Optics
 
 def fragment(calibration: CalibrationFolder, camera: str = "camera") -> str:
     """HTML of all figures and advice, without <html>. Raises BadInputError when nothing is calibrated."""
-    record = calibration.record(camera)
-    if record is None:
+    model = measured_model(calibration, camera)
+    if model is None:
         raise BadInputError(
             f"{calibration.folder} holds no record of camera {camera!r}; run 'airlens calibrate camera' first."
         )
-    try:
-        model = build(record)
-    except CalibrationError as error:
-        raise BadInputError(str(error)) from error
     bundle = calibration.bundle()
     parts = [
         f'<figure><img alt="{html.escape(title)}" src="{as_data_uri(figure)}">'
@@ -44,6 +40,17 @@ def fragment(calibration: CalibrationFolder, camera: str = "camera") -> str:
         advice += [f"Projector: {a}" for a in model.projector_optics.quality.advice]
     items = "".join(f"<li>{html.escape(a)}</li>" for a in advice) or "<li>Nothing to retake.</li>"
     return f'<section class="calibration"><h2>Calibration</h2>{"".join(parts)}<ul>{items}</ul></section>'
+
+
+def measured_model(calibration: CalibrationFolder, camera: str = "camera") -> Model | None:
+    """The models of a measured calibration; none where nothing was measured. Raises BadInputError."""
+    record = calibration.record(camera)
+    if record is None:
+        return None
+    try:
+        return build(record)
+    except CalibrationError as error:
+        raise BadInputError(str(error)) from error
 
 
 def write_page(calibration: CalibrationFolder, camera: str = "camera") -> str:

@@ -8,6 +8,8 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, select_autoescape
 from scipy.interpolate import RegularGridInterpolator
 
+from app.calibration_folder import CalibrationFolder
+from app.calibration_page import figures, measured_model
 from app.capture import load_capture
 from app.durable import write_text
 from app.experiment import Experiment, open_experiment, read_manifest
@@ -143,7 +145,20 @@ def _sections(
         Section("What the camera saw", tuple(seen)),
         Section("How far the pattern moved", tuple(moved)),
         Section("The air", tuple(air)),
+        *_calibration(experiment),
     ]
+
+
+def _calibration(experiment: Experiment) -> list[Section]:
+    """Residuals, coverage and the rig of each camera that was measured; nothing for a given one."""
+    folder = CalibrationFolder(experiment.folder)
+    found = []
+    for view in experiment.settings.scene.views:
+        model = measured_model(folder, view.name)
+        if model is not None:
+            pictures = (Picture(as_data_uri(f), title) for title, f in figures(model, folder.bundle()))
+            found.append(Section(f"Calibration: {view.name}", tuple(pictures)))
+    return found
 
 
 def _truth(experiment: Experiment) -> RoomVolume | None:

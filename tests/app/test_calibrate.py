@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from app.calibration_folder import CalibrationFolder
+from app.calibration_page import figures, measured_model
 from app.cli import create_cli
 from calibration.board import Chessboard
 from calibration.bundle import from_json
@@ -72,6 +74,12 @@ def test_camera_then_projector_from_a_folder(pictures, tmp_path):
     assert bundle.projector is not None
     assert bundle.projector.cross_covariance is not None
     assert len(bundle.images) == 4
+
+    # What the report shows of it; a calibration that was given, not measured, has nothing to show.
+    model = measured_model(CalibrationFolder(tmp_path))
+    assert model is not None
+    assert [title.split(":")[0] for title, _ in figures(model, bundle)] == ["Camera", "Projector"]
+    assert measured_model(CalibrationFolder(tmp_path / "elsewhere")) is None
 
     page = run("page", tmp_path)
     assert page.exit_code == 0, page.output
