@@ -45,3 +45,7 @@ def main() -> None:
 def _fail(message: str, status: int) -> None:
     print(f"airlens: {message}", file=sys.stderr)
     sys.exit(status)
+
+
+if __name__ == "__main__":
+    main()

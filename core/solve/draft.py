@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from core.knowledge import VertexGrid
 from core.problem import Problem
@@ -17,26 +17,35 @@ _transpose = jax.jit(lambda operator, shift: operator.transpose(shift))
 
 
 class _OnTheDevice:
-    """A `ShiftOperator` for NumPy arrays: compiled once, the weights passed as arguments."""
+    """A `ShiftOperator` for NumPy arrays, in float64: compiled once, the weights passed as arguments.
+
+    Along the view the data say nothing, and conjugate gradients then stall on float32's rounding.
+    """
 
     def __init__(self, operator: StraightRayOperator) -> None:
-        self._operator = operator
+        with jax.enable_x64(True):
+            self._operator = jax.tree.map(_widened, operator)
 
     def apply(self, values: Float[np.ndarray, "nx ny nz"]) -> Float[np.ndarray, "windows 2"]:
-        return np.asarray(_apply(self._operator, jnp.asarray(values, jnp.float32)), np.float64)
+        with jax.enable_x64(True):
+            return np.asarray(_apply(self._operator, jnp.asarray(values, jnp.float64)))
 
     def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Float[np.ndarray, "nx ny nz"]:
-        shift = jnp.asarray(displacement_px, jnp.float32)
-        return np.asarray(_transpose(self._operator, shift), np.float64)
+        with jax.enable_x64(True):
+            return np.asarray(_transpose(self._operator, jnp.asarray(displacement_px, jnp.float64)))
+
+
+def _widened(leaf: Array) -> Array:
+    return leaf.astype(jnp.float64) if jnp.issubdtype(leaf.dtype, jnp.floating) else leaf
 
 
 def draft_grid(scene: Scene) -> VertexGrid:
-    """48 cells along the room's longest side, cubes but for the view's axis, where nothing finer is seen."""
+    """48 cells along the room's longest side, cubes but for the view's axis: a third, for nothing is seen there."""
     size = scene.room.size_m
     longest = 48 if scene.solve.grid == "auto" else scene.solve.grid
     spacing = max(size) / longest
     counts = [int(np.clip(round(s / spacing), 8, longest)) + 1 for s in size]
-    counts[1] = max(9, (counts[1] + 1) // 2)
+    counts[1] = max(9, (counts[1] + 2) // 3)
     return VertexGrid(scene.room, (counts[0], counts[1], counts[2]))
 
 
@@ -46,7 +55,7 @@ def solve_draft(
     """Temperature in at most some ten seconds. Raises SettingError."""
     grid = draft_grid(problem.scene)
     operators = tuple(
-        _OnTheDevice(build(problem.scene, view, shift.centres_px, grid.shape))
+        _OnTheDevice(build(problem.scene, view, shift.centres_px, grid.shape, float(shift.window_px)))
         for view, shift in enumerate(problem.shifts)
     )
     return solve_temperature(problem, operators, grid, settings or TemperatureSettings(), on_event)

@@ -28,6 +28,7 @@ from core.air import Air
 from core.knowledge import KnownTemperature, VertexGrid, known_temperature, plane_on_grid, wall_index
 from core.problem import Problem, ShiftMeasurement
 from core.result import Outcome, Solution
+from core.scene import Scene
 from core.setting import SettingError, setting
 
 Volume = Float[np.ndarray, "nx ny nz"]
@@ -55,10 +56,10 @@ class TemperatureSettings:
     size that this grid cannot represent, added to the noise.
     """
 
-    across_k_m: float = 30.0
+    across_k_m: float = 2.0
     along_k_m: float = 1.0
-    representation: float = 0.03
-    tolerance: float = 1e-4
+    representation: float = 0.3
+    tolerance: float = 1e-3
     max_iterations: int = 400
 
 
@@ -72,6 +73,7 @@ class _System:
     known: KnownTemperature
     per_k: float
     stiffness: tuple[float, float, float]
+    slopes: tuple[float, float]
 
     def smooth(self, n: Volume) -> Volume:
         """Gradient of the smoothness term."""
@@ -128,7 +130,8 @@ def solve_temperature(
     stiffness = [cell / (h * s * per_k) ** 2 for h, s in zip(grid.spacing_m, scales, strict=True)]
     # A room's worth of independent gradients: one a hundred vertices.
     stiffness = [f * np.prod(grid.shape) / 100 for f in stiffness]
-    system = _System(grid, operators, weights, known, per_k, (stiffness[0], stiffness[1], stiffness[2]))
+    stiff = (stiffness[0], stiffness[1], stiffness[2])
+    system = _System(grid, operators, weights, known, per_k, stiff, steepest_slopes(problem.scene))
     n, iterations, settled = _minimise(system, problem.shifts, prior, air, settings, on_event)
     temperature = air.ambient_refractivity * air.ambient_temperature_k / (n + air.ambient_refractivity)
     x, y, z = grid.axes_m
@@ -223,8 +226,9 @@ def _minimise(
 def _preconditioner(system: _System) -> LinearOperator:
     """Inverse of a separable stand-in: eigenvectors along x and z, a dense system along the view y.
 
-    The stand-in takes the view as parallel along y: data = c (Lx / hx^2 + Lz / hz^2) (x) w w^T, with the
-    lever arms w of the slabs measured on the operators themselves. Known planes pin their wall.
+    The stand-in is data = (Lx / hx^2 + Lz / hz^2) (x) W, with the levers W of the slabs measured on the
+    operators themselves. Rays of a perspective view cross a wave at other phases from slab to slab, by up
+    to their slope: the mean over the slopes makes a sinc of W's off-diagonals. Known planes pin their wall.
     """
     shape, spacing = system.grid.shape, system.grid.spacing_m
     fx, fy, fz = system.stiffness
@@ -235,7 +239,7 @@ def _preconditioner(system: _System) -> LinearOperator:
     matrices = (
         (smooth[..., None, None] + 1e-3 * fx * lx[1]) * np.eye(shape[1])
         + fy * _laplacian(shape[1])
-        + across[..., None, None] * levers
+        + across[..., None, None] * levers * _coherence(system)
     )
     inverses = np.linalg.inv(matrices)
 
@@ -246,6 +250,31 @@ def _preconditioner(system: _System) -> LinearOperator:
 
     size = int(np.prod(shape))
     return _operator(apply, size)
+
+
+def _coherence(system: _System) -> Float[np.ndarray, "nx nz ny ny"]:
+    """Mean over the view's slopes of the phase between two slabs, for each pair of waves along x and z."""
+    y_m = system.grid.axes_m[1]
+    apart_m = y_m[:, None] - y_m[None]
+    factors = []
+    for axis in (0, 2):
+        waves_per_m = np.arange(system.grid.shape[axis]) / (2 * system.grid.box.size_m[axis])
+        factors.append(np.sinc(2 * waves_per_m[:, None, None] * system.slopes[axis // 2] * apart_m))
+    return factors[0][:, None] * factors[1][None]
+
+
+def steepest_slopes(scene: Scene) -> tuple[float, float]:
+    """Largest slope of a camera ray against the view's axis y that meets the back wall, along x and z."""
+    room = scene.room
+    slopes = []
+    for axis in (0, 2):
+        reach = [
+            abs(end - view.camera.position_m[axis]) / (room.upper_m[1] - view.camera.position_m[1])
+            for view in scene.views
+            for end in (room.lower_m[axis], room.upper_m[axis])
+        ]
+        slopes.append(max(reach))
+    return slopes[0], slopes[1]
 
 
 def _laplacian(n: int) -> Float[np.ndarray, "n n"]:

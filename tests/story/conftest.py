@@ -1,0 +1,21 @@
+"""One small experiment on the packaged room, made once for every story."""
+
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from app.rig_settings import SimulatedCameraSettings
+from app.room_scene import RigOptions
+from app.simulate import simulate
+
+ROOM = Path(str(files("app.sample") / "room.npz"))
+
+
+@pytest.fixture(scope="session")
+def experiment(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("story") / "room"
+    options = RigOptions(camera_px=(512, 384), frames=1)
+    return simulate(
+        ROOM, folder, options, "surveyed", SimulatedCameraSettings(noise_free=True, drift_px=0.02)
+    )
