@@ -94,5 +94,5 @@ def undetermined(problem: Problem) -> list[str]:
         return []
     return [
         "No inlet or heater is stated: nothing says what drives the air. Velocity is not determined by these "
-        "measurements; the one given follows from the walls' plane alone."
+        "measurements; the one given is that of still air left to the walls, and is not to be used."
     ]
