@@ -1,6 +1,5 @@
 """Nobody passes who should not: hostile headers on every route of the app, found by iterating over it."""
 
-import asyncio
 import http.client
 from collections.abc import Iterator
 from typing import Any
@@ -14,6 +13,7 @@ from starlette.routing import Route, WebSocketRoute
 from app.api import Limits, create_app
 from app.api.settings import service_config
 from tests.app.api.conftest import Live, is_problem
+from tests.run_async import run_async
 
 TOKEN = "t" * 43
 PORT = 8765
@@ -80,7 +80,7 @@ def ask(
     async def send(message: Any) -> None:
         answer.append(message)
 
-    asyncio.run(app(scope, receive, send))
+    run_async(app(scope, receive, send))
     if answer[0]["type"] == "websocket.accept":
         return 101, b""
     assert answer, (kind, method, path)

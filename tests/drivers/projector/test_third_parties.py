@@ -13,6 +13,7 @@ from drivers.projector.port import SerialPort, TcpPort
 from drivers.projector.protocol import PowerState
 from drivers.simulated.projector.hosts import PtyHost, TcpHost
 from tests.drivers.projector.twins import DIALECTS, make_twin
+from tests.run_async import run_async
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # of the clients
 
@@ -60,7 +61,7 @@ def test_epson_projector_drives_our_epson(tmp_path):
     twin = real_twin("escvp21")
     recorder = Recorder(twin)
     with PtyHost(twin, tmp_path / "epson") as host:
-        assert asyncio.run(drive(host.path)) == ["00", "01", "30", "TWIN-1"]
+        assert run_async(drive(host.path)) == ["00", "01", "30", "TWIN-1"]
         theirs, recorder.sent = recorder.sent, b""
         with ours("escvp21", host.path) as link:
             assert link.status().source == "30"
@@ -90,7 +91,7 @@ def test_benqprojector_drives_our_benq(tmp_path):
     twin = real_twin("benq")
     recorder = Recorder(twin)
     with PtyHost(twin, tmp_path / "benq") as host:
-        assert asyncio.run(drive(host.path)) == [0, "TWIN-1", 2, "hdmi"]
+        assert run_async(drive(host.path)) == [0, "TWIN-1", 2, "hdmi"]
         theirs, recorder.sent = recorder.sent, b""
         with ours("benq", host.path) as link:
             assert link.power() is PowerState.ON
@@ -119,7 +120,7 @@ def test_aiopjlink_drives_our_pjlink(password):
     twin = real_twin("pjlink", password=password)
     recorder = Recorder(twin)
     with TcpHost(twin) as host:
-        assert asyncio.run(drive(host.port, password))[:3] == ["OFF", "ON", "TWIN-1"]
+        assert run_async(drive(host.port, password))[:3] == ["OFF", "ON", "TWIN-1"]
         theirs, recorder.sent = recorder.sent, b""
         port = PjLinkPort(TcpPort("127.0.0.1", host.port), password)
         with ProjectorLink(DIALECTS["pjlink"][0](), port) as link:
@@ -129,5 +130,5 @@ def test_aiopjlink_drives_our_pjlink(password):
             assert question in recorder.sent
         if password:
             with pytest.raises(PJLinkPassword):
-                asyncio.run(drive(host.port, "wrong"))
+                run_async(drive(host.port, "wrong"))
             gc.collect()  # the client leaves its socket to the collector; let that be here
