@@ -8,22 +8,21 @@ steps of leapfrog). Memory: what the compiled gradient of 100 x 100 px x 4 sampl
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from typing import TypeVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from core.air import Air
 from core.fields import AbstractField, FunctionField, GridField, plume
-from core.geometry import Box, looking_along_y
+from core.geometry import Box
 from core.rays import AbstractRayTracer, NonlinearTracer, QuasiLinearTracer, Rays, StraightTracer
-from core.rays.operator import build
 from core.rays.yardstick import exact_wall_shift_m
-from core.render import pixel_geometry
-from core.scene import FixedTexture, Scene, View
 
+Tree = TypeVar("Tree", bound=PyTree)
 ROOM = Box(lower_m=(-1.2, -1.5, 0.0), upper_m=(2.9, 1.5, 3.0))
 AIR = Air()
 TRACERS = {"straight": StraightTracer, "quasi_linear": QuasiLinearTracer, "nonlinear": NonlinearTracer}
@@ -66,7 +65,8 @@ def _plume(excess_k: float) -> AbstractField:
     return plume(AIR, peak_k=jnp.asarray(excess_k), centre_m=(0.85, 0.0, 1.5), radius_m=0.25)
 
 
-def _grid(excess_k: float) -> GridField:
+def grid64(excess_k: float) -> GridField:
+    """The plume on 64^3 vertices of the room."""
     axes = [np.linspace(low, u, 64) for low, u in zip(ROOM.lower_m, ROOM.upper_m, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
     values = _plume(excess_k).excess(jnp.asarray(points, jnp.float32))
@@ -81,8 +81,8 @@ def _network(excess_k: float) -> AbstractField:
 # Field and the number of rays that its time is taken from.
 FIELDS: dict[str, tuple[Callable[[float], AbstractField], int]] = {
     "plume": (_plume, 10_000),
-    "grid64": (_grid, 10_000),
-    "network4x128": (_network, 500),
+    "grid64": (grid64, 10_000),
+    "network4x128": (_network, 200),
 }
 
 
@@ -101,7 +101,7 @@ def ray_rows(
                 tracer = kind(count, AIR.ambient_refractivity)
                 speed = _speed(tracer, make(10.0), rays)
                 for (excess_k, stand_off_m), expected in exact.items():
-                    found = _bend(tracer, _single(_bundle(stand_off_m, _ERROR_RAYS)), _single(make(excess_k)))
+                    found = bend(tracer, single(bundle(stand_off_m, _ERROR_RAYS)), single(make(excess_k)))
                     error = np.linalg.norm(np.asarray(found) - expected) / np.linalg.norm(expected)
                     yield RayRow(
                         field=name, tracer=tracer_name, dT_K=excess_k, stand_off_m=stand_off_m, steps=count,
@@ -110,40 +110,7 @@ def ray_rows(
                     )  # fmt: skip
 
 
-def operator_row(stand_off_m: float = 30.0) -> RayRow:
-    """The straight-ray operator on 110 x 110 windows; its gradient is the transpose."""
-    camera = looking_along_y(
-        position_m=(0.85, 1.5 - stand_off_m, 1.5), width_px=4096, height_px=3072, focal_px=999.0 * stand_off_m
-    )
-    scene = Scene(room=ROOM, views=(View(camera=camera),), light=FixedTexture())
-    lines = [(np.arange(110) + 0.5) * n / 110 for n in (4096, 2990)]
-    pixels = np.stack([a.ravel() for a in np.meshgrid(*lines)], axis=1)
-    field = _grid(10.0)
-    operator = build(scene, 0, pixels, (64, 64, 64), window_px=27.0)
-    found = np.asarray(operator.apply(jnp.asarray(field.values)))
-    # The same windows by traced rays: 5 x 5 a window, 512 steps.
-    places = ((np.arange(5) + 0.5) / 5 - 0.5) * 27.0
-    total = np.zeros_like(found)
-    tracer = StraightTracer(512, AIR.ambient_refractivity)
-    for column in places:
-        for row in places:
-            geometry = pixel_geometry(scene, 0, pixels + np.array([column, row]))
-            shift = np.asarray(_bend(tracer, geometry.camera, field))[:, [0, 2]]
-            total += shift * np.array([-999.0, 999.0]) * np.asarray(geometry.weight > 0)[:, None] / 25
-    whole = np.all(np.abs(pixels - np.array([2047.5, 1535.5])) < np.array([2020.0, 1470.0]), axis=1)
-    error = np.linalg.norm((found - total)[whole]) / np.linalg.norm(total[whole])
-    apply, transpose = eqx.filter_jit(lambda o, v: o.apply(v)), eqx.filter_jit(lambda o, d: o.transpose(d))
-    forward = len(pixels) / _cpu_s(apply, operator, field.values)
-    backward = len(pixels) / _cpu_s(transpose, operator, jnp.asarray(found))
-    size = sum(leaf.nbytes for leaf in jax.tree.leaves(eqx.filter(operator, eqx.is_array)))
-    return RayRow(
-        field="grid64", tracer="operator", dT_K=10.0, stand_off_m=stand_off_m, steps=64, dtype="float32",
-        rel_error=float(error), forward_rays_per_s=forward, gradient_rays_per_s=backward,
-        peak_memory_mb=size / 1e6,
-    )  # fmt: skip
-
-
-def _bundle(stand_off_m: float, count: int) -> Rays:
+def bundle(stand_off_m: float, count: int) -> Rays:
     """Rays to seeded points behind the middle of the room, float64."""
     rng = np.random.default_rng(0)
     points_m = np.stack([rng.uniform(0, 1.7, count), np.full(count, 1.5), rng.uniform(0.6, 2.4, count)], 1)
@@ -159,7 +126,8 @@ def _bundle(stand_off_m: float, count: int) -> Rays:
         )  # fmt: skip
 
 
-def _single(tree):
+def single(tree: Tree) -> Tree:
+    """The same with float32 arrays."""
     return jax.tree.map(
         lambda a: jnp.asarray(np.asarray(a), jnp.float32) if eqx.is_inexact_array(a) else a, tree
     )
@@ -170,27 +138,29 @@ def _exact(field: AbstractField, stand_off_m: float) -> Float[np.ndarray, "rays 
         wide = jax.tree.map(
             lambda a: jnp.asarray(np.asarray(a, float)) if eqx.is_inexact_array(a) else a, field
         )
-        rays = _bundle(stand_off_m, _ERROR_RAYS)
+        rays = bundle(stand_off_m, _ERROR_RAYS)
         if isinstance(field, GridField):
-            return np.asarray(_bend(NonlinearTracer(4096, AIR.ambient_refractivity), rays, wide))
+            return np.asarray(bend(NonlinearTracer(4096, AIR.ambient_refractivity), rays, wide))
         return exact_wall_shift_m(rays, wide, AIR.ambient_refractivity)
 
 
 @eqx.filter_jit
-def _bend(tracer: AbstractRayTracer, rays: Rays, field: AbstractField) -> Array:
+def bend(tracer: AbstractRayTracer, rays: Rays, field: AbstractField) -> Float[Array, "rays 3"]:
+    """Wall shift [m], compiled."""
     return tracer.bend(rays, field).wall_shift_m
 
 
 @eqx.filter_jit
-def _gradient(tracer: AbstractRayTracer, rays: Rays, field: AbstractField) -> tuple[Array, AbstractField]:
+def gradient(tracer: AbstractRayTracer, rays: Rays, field: AbstractField) -> tuple[Array, AbstractField]:
+    """A quadratic loss of the wall shift and its gradient in the field, compiled."""
     return eqx.filter_value_and_grad(lambda f: 1e6 * jnp.sum(tracer.bend(rays, f).wall_shift_m ** 2))(field)
 
 
 def _speed(tracer: AbstractRayTracer, field: AbstractField, count: int) -> tuple[float, float, float]:
     """Rays per CPU second, forward and with gradient, and the memory of a large gradient [MB]."""
-    field, rays = _single(field), _single(_bundle(30.0, count))
-    size = _gradient_bytes(tracer, _single(_bundle(30.0, _MEMORY_RAYS)), field)
-    forward, backward = (_cpu_s(f, tracer, rays, field) for f in (_bend, _gradient))
+    field, rays = single(field), single(bundle(30.0, count))
+    size = _gradient_bytes(tracer, single(bundle(30.0, _MEMORY_RAYS)), field)
+    forward, backward = (cpu_s(f, tracer, rays, field) for f in (bend, gradient))
     return count / forward, count / backward, size / 1e6
 
 
@@ -207,7 +177,7 @@ def _gradient_bytes(tracer: AbstractRayTracer, rays: Rays, field: AbstractField)
     return sum(sizes) + sum(leaf.nbytes for leaf in jax.tree.leaves(rays))
 
 
-def _cpu_s(function: Callable, *arguments: object) -> float:
+def cpu_s(function: Callable, *arguments: object) -> float:
     """Least CPU time of five runs after one that compiles."""
     jax.block_until_ready(function(*arguments))
     best = np.inf

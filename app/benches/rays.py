@@ -1,6 +1,7 @@
 """`airlens bench rays`: error against time of the ray tracers."""
 
 import json
+from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
@@ -8,7 +9,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from app.ray_trade import CONTRASTS_K, FIELDS, STAND_OFFS_M, RayRow, operator_row, ray_rows
+from app.operator_trade import operator_row
+from app.ray_trade import CONTRASTS_K, FIELDS, STAND_OFFS_M, RayRow, ray_rows
 
 
 def register(bench: typer.Typer) -> None:
@@ -28,9 +30,9 @@ def rays(
     contrasts_k = (10.0, 1500.0) if quick else CONTRASTS_K
     stand_offs_m = (30.0,) if quick else STAND_OFFS_M
     rows = []
-    for row in (
-        *[operator_row()],
-        *ray_rows(fields, contrasts_k, stand_offs_m, (64,) if quick else (16, 64)),
+    for row in chain(
+        [operator_row()],
+        ray_rows(fields, contrasts_k, stand_offs_m, (64,) if quick else (16, 64, 256)),
     ):
         rows.append(row)
         if json_lines:

@@ -1,11 +1,11 @@
 """A field on the vertices of the room, trilinear between them."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from core.fields.cell import blend
 from core.fields.field import AbstractField, Components
 from core.geometry import Vector3
 from core.setting import SettingError
@@ -48,8 +48,7 @@ class GridField(AbstractField):
         """Trilinear value and the gradient of the interpolant."""
         cells = [n - 1 for n in self.values.shape]
         index, fraction = locate(place_m, self.lower_m, self.upper_m, cells)
-        corners = _corners(jnp.asarray(self.values).astype(fraction[0].dtype), index)
-        value, slopes = _interpolate(corners, fraction)
+        value, slopes = blend(jnp.asarray(self.values).astype(fraction[0].dtype), index, fraction)
         dx, dy, dz = self.spacing_m
         return value, (slopes[0] / dx, slopes[1] / dy, slopes[2] / dz)
 
@@ -69,51 +68,3 @@ def locate(
         index.append(cell)
         fraction.append(position - cell.astype(position.dtype))
     return jnp.stack(index, axis=-1), (fraction[0], fraction[1], fraction[2])
-
-
-def gather_blocks(
-    values: Float[Array, "nx ny nz"], first: Int[Array, "points 3"], size: int
-) -> Float[Array, "points size size size"]:
-    """The block of `size`^3 vertices that starts at each index: one gather, transposed one scatter."""
-    numbers = jax.lax.GatherDimensionNumbers((1, 2, 3), (), (0, 1, 2))
-    return jax.lax.gather(values, first, numbers, (size, size, size), mode="promise_in_bounds")
-
-
-@jax.custom_vjp
-def _corners(
-    values: Float[Array, "nx ny nz"], index: Int[Array, "points 3"]
-) -> tuple[Float[Array, " points"], ...]:
-    """The eight corners of each cell, x slowest, z fastest; its transpose is one scatter of blocks."""
-    block = gather_blocks(values, index, 2)
-    return tuple(block[:, i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1))
-
-
-def _corners_forward(values: Array, index: Array) -> tuple[tuple[Array, ...], tuple[Array, Array]]:
-    return _corners(values, index), (values, index)
-
-
-def _corners_backward(kept: tuple[Array, Array], bars: tuple[Array, ...]) -> tuple[Array, None]:
-    values, index = kept
-    blocks = jnp.stack(bars, axis=-1).reshape(-1, 2, 2, 2)
-    numbers = jax.lax.ScatterDimensionNumbers((1, 2, 3), (), (0, 1, 2))
-    empty = jnp.zeros_like(values)
-    return jax.lax.scatter_add(empty, index, blocks, numbers, mode="promise_in_bounds"), None
-
-
-_corners.defvjp(_corners_forward, _corners_backward)
-
-
-def _interpolate(
-    corners: tuple[Float[Array, " points"], ...], fraction: Components
-) -> tuple[Float[Array, " points"], Components]:
-    """Value and slopes per cell, blending z, then y, then x."""
-    fx, fy, fz = fraction
-    pairs = list(zip(corners[::2], corners[1::2], strict=True))
-    slope_z = [high - low for low, high in pairs]
-    on_z = [low + fz * step for (low, _), step in zip(pairs, slope_z, strict=True)]
-    slope_y = [on_z[1] - on_z[0], on_z[3] - on_z[2]]
-    on_y = [on_z[0] + fy * slope_y[0], on_z[2] + fy * slope_y[1]]
-    z_on_y = [a + fy * (b - a) for a, b in (slope_z[:2], slope_z[2:])]
-    slope_x = on_y[1] - on_y[0]
-    y, z = (low + fx * (high - low) for low, high in (slope_y, z_on_y))
-    return on_y[0] + fx * slope_x, (slope_x, y, z)

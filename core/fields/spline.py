@@ -1,13 +1,14 @@
 """A field on the vertices of the room, a cubic B-spline between them."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 from scipy.linalg import solve_banded
 
 from core.fields.field import AbstractField, Components
-from core.fields.grid import gather_blocks, locate
+from core.fields.grid import locate
 from core.geometry import Vector3
 
 
@@ -28,7 +29,7 @@ class SplineField(AbstractField):
         """Value and gradient [1/m]; outside the box the nearest face's."""
         cells = [n - 3 for n in self.coefficients.shape]
         index, fraction = locate(place_m, self.lower_m, self.upper_m, cells)
-        block = gather_blocks(jnp.asarray(self.coefficients).astype(fraction[0].dtype), index, 4)
+        block = _blocks(jnp.asarray(self.coefficients).astype(fraction[0].dtype), index, 4)
         (wx, wy, wz), (sx, sy, sz) = (tuple(f(t) for t in fraction) for f in (_weights, _slopes))
         value_z = jnp.einsum("pijk,pk->pij", block, wz)
         slope_z = jnp.einsum("pijk,pk->pij", block, sz)
@@ -60,6 +61,14 @@ def _solve(values: np.ndarray) -> np.ndarray:
     bands[1, 0] = bands[1, -1] = 1.0
     inner = solve_banded((1, 1), bands, values.reshape(count, -1)).reshape(values.shape)
     return np.concatenate([2 * inner[:1] - inner[1:2], inner, 2 * inner[-1:] - inner[-2:-1]])
+
+
+def _blocks(
+    coefficients: Float[Array, "nx_2 ny_2 nz_2"], first: Int[Array, "points 3"], size: int
+) -> Float[Array, "points size size size"]:
+    """The block of `size`^3 coefficients that starts at each index: one gather, transposed one scatter."""
+    numbers = jax.lax.GatherDimensionNumbers((1, 2, 3), (), (0, 1, 2))
+    return jax.lax.gather(coefficients, first, numbers, (size, size, size), mode="promise_in_bounds")
 
 
 def _weights(t: Float[Array, " points"]) -> Float[Array, "points 4"]:
