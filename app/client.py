@@ -23,11 +23,14 @@ from app.api.events import EventResource
 from app.api.experiments import ExperimentLine, ExperimentResource
 from app.api.jobs import Curves, JobResource
 from app.api.problems import MEDIA_TYPE, Problem
+from app.api.projector import ProjectorResource, WireLine
 from app.api.results import PresetResource, ResultLine, ResultResource
+from app.api.screen import ScreenResource
 from app.api.shift import ShiftResource
 from app.api.uploads import Upload
 from app.durable import write_durably
 from app.errors import AirlensError, BadInputError
+from app.patterns import PatternName
 
 T = TypeVar("T")
 ENDED = ("done", "failed", "cancelled")
@@ -80,9 +83,9 @@ class Client:
 
     # Devices
 
-    def devices(self) -> list[CameraResource]:
+    def devices(self) -> list[CameraResource | ProjectorResource]:
         """List the devices and their states."""
-        return self._ask(list[CameraResource], "GET", "/devices")
+        return self._ask(list[CameraResource | ProjectorResource], "GET", "/devices")
 
     def camera(self) -> CameraResource:
         """Return the camera's state."""
@@ -109,6 +112,50 @@ class Client:
     def shift(self) -> ShiftResource:
         """Return how far the picture moved since the reference; for the eyes."""
         return self._ask(ShiftResource, "GET", "/devices/camera/shift")
+
+    def projector(self) -> ProjectorResource:
+        """Return what the projector said when it was last asked."""
+        return self._ask(ProjectorResource, "GET", "/devices/projector")
+
+    def connect_projector(self, experiment: str) -> ProjectorResource:
+        """Speak to the projector of an experiment's rig."""
+        return self._ask(ProjectorResource, "POST", "/devices/projector/connect", {"experiment": experiment})
+
+    def disconnect_projector(self) -> ProjectorResource:
+        """Free the projector's line."""
+        return self._ask(ProjectorResource, "POST", "/devices/projector/disconnect")
+
+    def change_projector(
+        self,
+        power: Literal["on", "off"] | None = None,
+        source: str | None = None,
+        muted: bool | None = None,
+        frozen: bool | None = None,
+    ) -> ProjectorResource:
+        """Switch power, source, mute or freeze."""
+        body = {"power": power, "source": source, "muted": muted, "frozen": frozen}
+        return self._ask(ProjectorResource, "PATCH", "/devices/projector", body)
+
+    def wire(self, after_s: float = 0.0) -> list[WireLine]:
+        """List what went over the projector's line after a moment (Unix time)."""
+        return self._ask(list[WireLine], "GET", "/devices/projector/wire", query={"after_s": str(after_s)})
+
+    def screen(self) -> ScreenResource:
+        """Return what the kiosk page shows."""
+        return self._ask(ScreenResource, "GET", "/devices/screen")
+
+    def show_pattern(self, experiment: str, pattern: PatternName = "scene") -> ScreenResource:
+        """Put a pattern on the kiosk page."""
+        body = {"experiment": experiment, "pattern": pattern}
+        return self._ask(ScreenResource, "PUT", "/devices/screen", body)
+
+    def clear_screen(self) -> ScreenResource:
+        """Take the pattern away from the kiosk page."""
+        return self._ask(ScreenResource, "DELETE", "/devices/screen")
+
+    def preview_pattern(self, experiment: str, pattern: PatternName = "scene", width: int = 480) -> bytes:
+        """Return a pattern as a small PNG."""
+        return self._bytes(f"/experiments/{experiment}/patterns/{pattern}", {"width": str(width)}).content
 
     # Experiments and results
 

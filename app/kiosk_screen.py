@@ -43,6 +43,13 @@ class KioskScreen:
             return self._digest, self._picture
 
     @property
+    def wanted(self) -> tuple[str, tuple[int, int] | None]:
+        """The digest and the size (columns, rows) of that picture, asked by somebody else."""
+        with self._changed:
+            picture = self._picture
+            return self._digest, None if picture is None else (picture.shape[1], picture.shape[0])
+
+    @property
     def report(self) -> ScreenReport | None:
         """The page's last word on the present picture."""
         with self._changed:
@@ -56,12 +63,23 @@ class KioskScreen:
                 self._report = report
                 self._changed.notify_all()
 
-    def show(self, picture: Picture) -> str:
-        """Return the digest once the page has drawn the picture and read it back the same."""
+    @property
+    def is_alive(self) -> bool:
+        """Whether a page asked or reported within the last seconds."""
+        return time.monotonic() - self._seen_s < ALIVE_S
+
+    def put(self, picture: Picture) -> str:
+        """Return the digest at once; the page draws the picture when it next asks."""
         digest = picture_digest(picture)
         with self._changed:
             if digest != self._digest:
                 self._picture, self._digest, self._report = np.ascontiguousarray(picture), digest, None
+        return digest
+
+    def show(self, picture: Picture) -> str:
+        """Return the digest once the page has drawn the picture and read it back the same."""
+        digest = self.put(picture)
+        with self._changed:
             answered = self._changed.wait_for(lambda: self._report is not None, self._timeout_s)
             report = self._report
         if not answered or report is None:

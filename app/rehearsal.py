@@ -8,13 +8,15 @@ from typing import Literal
 
 from app.durable import write_durably, write_text
 from app.experiment import Experiment, ExperimentSettings, create_experiment, new_id
-from app.rig_settings import RigSettings, SimulatedCameraSettings
+from app.rig_settings import ProjectorSettings, RigSettings, SimulatedCameraSettings
 from app.room_scene import Information, RigOptions, room_scene, write_plane
 from app.simulate import TRUTH_FILE
 from app.truth import read_volume
 from calibration.bundle import given_bundle, to_json
 from core.scene import PlaneField, ProjectedPattern
 
+# Fast enough to practise with; a real lamp takes longer, and its lamp guard is the real one.
+TWIN = ProjectorSettings(url="simulated:?warm_up_s=8&cool_down_s=6")
 SAMPLE_ROOM = Path(__file__).resolve().parent / "sample" / "room.npz"
 
 
@@ -36,7 +38,10 @@ def rehearse(root: Path, wanted: Rehearsal) -> Experiment:
     settings = ExperimentSettings(
         title=wanted.title,
         information=wanted.information,
-        rig=RigSettings(camera=SimulatedCameraSettings(drift_px=0.1)),
+        rig=RigSettings(
+            camera=SimulatedCameraSettings(drift_px=0.1),
+            projector=TWIN if wanted.light == "projector" else None,
+        ),
         scene=scene,
     )
     name = new_id(root, "simulated")

@@ -3,12 +3,15 @@
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 from jaxtyping import Float32
 
 from app.cameras import open_v4l2
+from app.errors import BadInputError
 from app.experiment import Experiment
+from app.projectors import open_real_projector
 from app.rig_settings import SimulatedCameraSettings
 from app.room_scene import FINEST_PX
 from app.truth import RoomVolume, read_volume
@@ -16,8 +19,16 @@ from core.fields import GridField
 from core.geometry import Box, Optics, crop, rotation_matrix, rotation_vector
 from core.render import render_flow, render_reference
 from core.scene import FixedTexture, Scene, WaveletPattern
+from drivers.clock import SystemClock
+from drivers.projector.escvp21 import EscVp21
+from drivers.projector.link import ProjectorLink
+from drivers.projector.protocol import Projector
 from drivers.protocols import Camera
 from drivers.simulated import SensorNoise, SimulatedCamera
+from drivers.simulated.projector.engine import SimulatedProjector
+from drivers.simulated.projector.escvp21 import EscVp21Twin
+from drivers.simulated.projector.hosts import LoopPort
+from drivers.simulated.projector.state import ProjectorState
 
 AirState = Literal["still", "moving"]
 
@@ -31,6 +42,30 @@ def open_camera(experiment: Experiment, air: AirState, view: int = 0) -> Camera:
     if isinstance(settings, SimulatedCameraSettings):
         return _simulated_camera(experiment, settings, air, view)
     return open_v4l2(settings)
+
+
+def open_projector(experiment: Experiment) -> Projector:
+    """Return the experiment's projector; its line opens when it is first asked. Raises BadInputError."""
+    settings = experiment.settings.rig.projector
+    if settings is None:
+        raise BadInputError(
+            f"The rig of {experiment.folder.name} names no projector. Add to its experiment.toml: "
+            '[rig.projector] with url = "pjlink://ADDRESS" or "escvp21:/dev/ttyUSB0".'
+        )
+    return _twin(settings.url) if settings.url.startswith("simulated:") else open_real_projector(settings.url)
+
+
+def _twin(url: str) -> Projector:
+    """The twin of an Epson; `simulated:?warm_up_s=15&cool_down_s=10` sets its times."""
+    asked = parse_qs(urlsplit(url).query)
+    try:
+        warm_up_s, cool_down_s = (float(asked[name][-1]) for name in ("warm_up_s", "cool_down_s"))
+    except (KeyError, ValueError) as error:
+        raise BadInputError(
+            f"{url!r} is no simulated projector ({error}); expected simulated:?warm_up_s=15&cool_down_s=10."
+        ) from None
+    state = ProjectorState(SystemClock(), warm_up_s, cool_down_s)
+    return ProjectorLink(EscVp21(), LoopPort(SimulatedProjector(EscVp21Twin(state))))
 
 
 def _simulated_camera(

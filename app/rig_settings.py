@@ -34,7 +34,14 @@ class V4l2CameraSettings(Strict):
 CameraSettings = Annotated[SimulatedCameraSettings | V4l2CameraSettings, Field(discriminator="kind")]
 
 
+class ProjectorSettings(Strict):
+    """How the projector is spoken to: `airlens projector` takes the same address; `simulated:` is a twin."""
+
+    url: str
+
+
 class RigSettings(Strict):
     """The devices of the rig."""
 
     camera: CameraSettings = SimulatedCameraSettings()
+    projector: ProjectorSettings | None = None

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from app.api.bodies import body
 from app.api.problems import ApiError
+from app.api.projector import ProjectorResource, projector_resource
 from app.api.services import Given, services_of
 from app.api.strict import Strict
 from app.api.viewer import Viewer
@@ -64,9 +65,9 @@ class Asked(Strict):
 
 
 @router.get("/devices")
-def list_devices(given: Given) -> list[CameraResource]:
+def list_devices(given: Given) -> list[CameraResource | ProjectorResource]:
     """List the devices and their states."""
-    return [_resource(given.camera.status)]
+    return [_resource(given.camera.status), projector_resource(given.projector.report)]
 
 
 @router.get("/devices/camera")

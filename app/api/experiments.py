@@ -11,6 +11,7 @@ from app.api.strict import Identifier, Strict
 from app.configuration import to_plain
 from app.experiment import Experiment, save_settings
 from app.rehearsal import Rehearsal, rehearse
+from core.scene import ProjectedPattern
 
 router = APIRouter(tags=["experiments"])
 
@@ -22,6 +23,8 @@ class ExperimentLine(Strict):
     title: str
     information: str
     camera: str
+    projector: bool
+    light: Literal["texture", "projector"]
     calibrated: bool
     captures: int
     results: int
@@ -87,6 +90,8 @@ def _line(experiment: Experiment) -> ExperimentLine:
         title=settings.title,
         information=settings.information,
         camera=settings.rig.camera.kind,
+        projector=settings.rig.projector is not None,
+        light="projector" if isinstance(settings.scene.light, ProjectedPattern) else "texture",
         calibrated=experiment.bundle_path.is_file(),
         captures=len(experiment.captures()),
         results=len(list(experiment.results_folder.glob("*/manifest.json"))),

@@ -14,7 +14,9 @@ from app.api import (
     events,
     experiments,
     jobs,
+    projector,
     results,
+    screen,
     session,
     shift,
     uploads,
@@ -32,6 +34,8 @@ RESOURCES: tuple[APIRouter, ...] = (
     about.router,
     session.router,
     devices.router,
+    projector.router,
+    screen.router,
     shift.router,
     experiments.router,
     calibrations.router,
@@ -53,6 +57,7 @@ def create_app(config: ServiceConfig) -> FastAPI:
         yield
         services.desk.close()
         services.camera.close()
+        services.projector.close()
 
     app = FastAPI(
         title="airlens",

@@ -16,6 +16,7 @@ from app.desk import CaptureDesk
 from app.jobs import Ledger
 from app.kiosk_screen import KioskScreen
 from app.live import LiveCamera
+from app.live_projector import LiveProjector
 from app.uploads.store import UploadLimits, UploadStore
 
 
@@ -34,6 +35,7 @@ class Services:
     camera: LiveCamera
     desk: CaptureDesk
     screen: KioskScreen
+    projector: LiveProjector
 
 
 def create_services(config: ServiceConfig) -> Services:
@@ -60,6 +62,7 @@ def create_services(config: ServiceConfig) -> Services:
         camera,
         CaptureDesk(camera, ledger.append_event),
         KioskScreen(),
+        LiveProjector(ledger.append_event),
     )
 
 

@@ -2,13 +2,13 @@
 
 import contextlib
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from app.projectors import PASSWORD, open_real_projector
 
 Url = Annotated[
     str,
@@ -16,7 +16,6 @@ Url = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Wire = Annotated[bool, typer.Option("--wire", help="Show what goes over the line.")]
-PASSWORD = "AIRLENS_PROJECTOR_PASSWORD"
 
 
 def register(cli: typer.Typer) -> None:
@@ -82,16 +81,9 @@ def _switch(name: str):
 
 @contextlib.contextmanager
 def _opened(url: str, wire: bool) -> Iterator:
-    from drivers.projector.open import open_projector
-
-    journal = Path.home() / ".local" / "state" / "airlens" / f"lamp-{_safe(url)}.json"
-    with open_projector(url, password=os.environ.get(PASSWORD, ""), journal=journal) as projector:
+    with open_real_projector(url) as projector:
         try:
             yield projector
         finally:
             for entry in projector.log.entries if wire else ():
                 typer.echo(str(entry), err=True)
-
-
-def _safe(url: str) -> str:
-    return "".join(c if c.isalnum() else "-" for c in url)

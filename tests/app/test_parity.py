@@ -59,7 +59,7 @@ def asked_by_the_client() -> set[tuple[str, tuple[str, ...]]]:
     for method in requests().values():
         text = inspect.getsource(method)
         paths = re.findall(r"""f?"(/[^"]*)\"""", text)
-        verb = re.search(r'"(GET|POST|PATCH|DELETE)"', text)
+        verb = re.search(r'"(GET|POST|PUT|PATCH|DELETE)"', text)
         if "self._http.delete" in text:
             name = "DELETE"
         elif "self._http.post" in text:
