@@ -61,11 +61,20 @@ class DeskStatus:
 
 
 class CaptureDesk:
-    """Takes captures with the camera of `live`; `tell(kind, body)` hears of state and progress."""
+    """Takes captures with the camera of `live`; `tell(kind, body)` hears of state and progress.
 
-    def __init__(self, live: LiveCamera, tell: Callable[[str, Mapping[str, Any]], object]) -> None:
+    `lamp_on_s` says how long the light has been on, where somebody knows it: the burst is judged by it.
+    """
+
+    def __init__(
+        self,
+        live: LiveCamera,
+        tell: Callable[[str, Mapping[str, Any]], object],
+        lamp_on_s: Callable[[], float | None] = lambda: None,
+    ) -> None:
         self._live = live
         self._tell = tell
+        self._lamp_on_s = lamp_on_s
         self._status = DeskStatus()
         self._abort = threading.Event()
         self._discard = False
@@ -136,7 +145,14 @@ class CaptureDesk:
             self._live.show(taken.frame)
 
         try:
-            burst = run_capture(camera, plan, self._progress, on_frame=follow, abort=self._abort.is_set)
+            burst = run_capture(
+                camera,
+                plan,
+                self._progress,
+                on_frame=follow,
+                abort=self._abort.is_set,
+                rig_on_s=self._lamp_on_s(),
+            )
         except BaseException:
             recorder.discard()
             raise

@@ -54,7 +54,7 @@ class WireLine(Strict):
     """One piece of traffic: > sent, < received, ! a remark; control bytes are spelled out."""
 
     at_s: float
-    direction: Literal[">", "<", "!"]
+    direction: str
     text: str
 
 

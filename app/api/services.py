@@ -50,6 +50,7 @@ def create_services(config: ServiceConfig) -> Services:
     )
     ledger = Ledger(config.jobs_folder)
     camera = LiveCamera(ledger.append_event)
+    projector = LiveProjector(ledger.append_event)
     return Services(
         config,
         Access(config),
@@ -60,9 +61,9 @@ def create_services(config: ServiceConfig) -> Services:
         CurveCache(ledger),
         SolutionCache(),
         camera,
-        CaptureDesk(camera, ledger.append_event),
+        CaptureDesk(camera, ledger.append_event, projector.lamp_on_s),
         KioskScreen(),
-        LiveProjector(ledger.append_event),
+        projector,
     )
 
 

@@ -1,7 +1,7 @@
 // What the page knows of the service, kept fresh by one stream of events. Nothing here is the only copy:
 // closing the tab loses nothing.
 import { ask, get, openSession, post, ProblemError, type Problem } from "./api";
-import type { Camera, Capture, Desk, Experiment, Job, ResultLine, ServiceEvent } from "./types";
+import type { Camera, Capture, Desk, Experiment, Job, Projector, ResultLine, ServiceEvent } from "./types";
 
 export const PAGES = ["Rig", "Calibrate", "Capture", "Reconstruct", "Look"] as const;
 export type Page = (typeof PAGES)[number];
@@ -21,6 +21,7 @@ class Bench {
   experiments = $state.raw<Experiment[]>([]);
   experiment = $state<string | null>(null);
   camera = $state.raw<Camera | null>(null);
+  projector = $state.raw<Projector | null>(null);
   desk = $state.raw<Desk | null>(null);
   captures = $state.raw<Capture[]>([]);
   jobs = $state.raw<Job[]>([]);
@@ -64,15 +65,23 @@ class Bench {
   }
 
   async refresh(): Promise<void> {
-    [this.experiments, this.camera, this.desk, this.jobs] = await Promise.all([
+    [this.experiments, this.camera, this.projector, this.desk, this.jobs] = await Promise.all([
       get<Experiment[]>("/experiments"),
       get<Camera>("/devices/camera"),
+      get<Projector>("/devices/projector"),
       get<Desk>("/captures/running"),
       get<Job[]>("/jobs"),
     ]);
     const known = this.experiments.some((one) => one.experiment === this.experiment);
     if (!known) this.experiment = this.camera.experiment ?? this.experiments[0]?.experiment ?? null;
     await this.refreshExperiment();
+  }
+
+  async refreshDevices(): Promise<void> {
+    [this.camera, this.projector] = await Promise.all([
+      get<Camera>("/devices/camera"),
+      get<Projector>("/devices/projector"),
+    ]);
   }
 
   async refreshExperiment(): Promise<void> {
@@ -94,8 +103,9 @@ class Bench {
 
   // Actions: each is one request of the API.
 
-  async createSimulated(): Promise<void> {
-    const made = await post<Experiment>("/experiments", { kind: "simulated", title: "Simulated room" });
+  async createSimulated(light: "texture" | "projector" = "texture"): Promise<void> {
+    const title = light === "texture" ? "Simulated room" : "Simulated room, projected light";
+    const made = await post<Experiment>("/experiments", { kind: "simulated", title, light });
     this.experiment = made.experiment;
     await this.connect();
     await this.refresh();
@@ -107,6 +117,14 @@ class Bench {
 
   async disconnect(): Promise<void> {
     this.camera = await post<Camera>("/devices/camera/disconnect");
+  }
+
+  async connectProjector(): Promise<void> {
+    this.projector = await post<Projector>("/devices/projector/connect", { experiment: this.experiment });
+  }
+
+  async disconnectProjector(): Promise<void> {
+    this.projector = await post<Projector>("/devices/projector/disconnect");
   }
 
   async calibrate(): Promise<void> {
@@ -206,7 +224,7 @@ class Bench {
     if (event.kind === "capture") {
       if (this.desk) this.desk = { ...this.desk, ...(event.body as Partial<Desk>) };
       if (event.body["state"] !== "running") void this.later("experiment");
-    } else if (event.kind === "device") void this.later("camera");
+    } else if (event.kind === "device") void this.later("devices");
     else if (event.kind === "experiment") void this.later("all");
     else if (event.job) {
       this.progress(event);
@@ -222,13 +240,13 @@ class Bench {
   }
 
   /** Many events in a burst cause one look. */
-  private async later(what: "all" | "camera" | "experiment"): Promise<void> {
+  private async later(what: "all" | "devices" | "experiment"): Promise<void> {
     if (this.pending.has(what)) return;
     this.pending.add(what);
     await new Promise((resolve) => setTimeout(resolve, 100));
     this.pending.delete(what);
     try {
-      if (what === "camera") this.camera = await get<Camera>("/devices/camera");
+      if (what === "devices") await this.refreshDevices();
       else if (what === "experiment") await this.refreshExperiment();
       else await this.refresh();
       if (what === "experiment") this.desk = await get<Desk>("/captures/running");

@@ -5,6 +5,8 @@ export interface Experiment {
   title: string;
   information: string;
   camera: string;
+  projector: boolean;
+  light: "texture" | "projector";
   calibrated: boolean;
   captures: number;
   results: number;
@@ -21,6 +23,34 @@ export interface Camera {
   frame_rate_hz: number | null;
   exposure_s: number | null;
   gain: number | null;
+  reason: string;
+}
+
+export interface Projector {
+  state: "closed" | "standby" | "warming" | "on" | "cooling" | "fault" | "silent" | "lost";
+  experiment: string | null;
+  name: string | null;
+  source: string | null;
+  muted: boolean | null;
+  frozen: boolean | null;
+  lamp_hours: number | null;
+  lamp_on_s: number | null;
+  for_s: number | null;
+  errors: string[];
+  capabilities: string[];
+  reason: string;
+}
+
+export interface WireLine {
+  at_s: number;
+  direction: string;
+  text: string;
+}
+
+export interface Screen {
+  state: "empty" | "waiting" | "showing" | "refused" | "away";
+  width_px: number | null;
+  height_px: number | null;
   reason: string;
 }
 
