@@ -61,20 +61,11 @@ class DeskStatus:
 
 
 class CaptureDesk:
-    """Takes captures with the camera of `live`; `tell(kind, body)` hears of state and progress.
+    """Takes captures with the camera of `live`; `tell(kind, body)` hears of state and progress."""
 
-    `lamp_on_s` says how long the light has been on, where somebody knows it: the burst is judged by it.
-    """
-
-    def __init__(
-        self,
-        live: LiveCamera,
-        tell: Callable[[str, Mapping[str, Any]], object],
-        lamp_on_s: Callable[[], float | None] = lambda: None,
-    ) -> None:
+    def __init__(self, live: LiveCamera, tell: Callable[[str, Mapping[str, Any]], object]) -> None:
         self._live = live
         self._tell = tell
-        self._lamp_on_s = lamp_on_s
         self._status = DeskStatus()
         self._abort = threading.Event()
         self._discard = False
@@ -145,14 +136,7 @@ class CaptureDesk:
             self._live.show(taken.frame)
 
         try:
-            burst = run_capture(
-                camera,
-                plan,
-                self._progress,
-                on_frame=follow,
-                abort=self._abort.is_set,
-                rig_on_s=self._lamp_on_s(),
-            )
+            burst = run_capture(camera, plan, self._progress, on_frame=follow, abort=self._abort.is_set)
         except BaseException:
             recorder.discard()
             raise

@@ -67,10 +67,6 @@ class LiveProjector:
         """What is known now."""
         return self._report
 
-    def lamp_on_s(self) -> float | None:
-        """How long the lamp has been on; None where nobody knows."""
-        return self._report.said.on_s if self._report.said else None
-
     @property
     def wire(self) -> tuple[WireEntry, ...]:
         """The latest traffic, oldest first."""

@@ -61,7 +61,7 @@ def create_services(config: ServiceConfig) -> Services:
         CurveCache(ledger),
         SolutionCache(),
         camera,
-        CaptureDesk(camera, ledger.append_event, projector.lamp_on_s),
+        CaptureDesk(camera, ledger.append_event),
         KioskScreen(),
         projector,
     )
