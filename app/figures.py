@@ -98,6 +98,19 @@ def error_figure(solution: Solution, error_k: np.ndarray) -> Figure:
     return figure
 
 
+def volume_figure(solution: Solution, values: np.ndarray, label: str, highest: float | None = None) -> Figure:
+    """A volume from zero upwards on the three middle planes."""
+    figure = Figure(figsize=(13, 4.2), layout="constrained")
+    axes = figure.subplots(1, 3)
+    limit = highest or float(np.percentile(values[1:-1, 1:-1, 1:-1], 99)) or 1e-6
+    drawn = [
+        _slice(axis, solution, values, normal, SEQUENTIAL, 0.0, limit, arrows=False)
+        for axis, normal in zip(axes, (1, 0, 2), strict=True)
+    ]
+    figure.colorbar(drawn[0], ax=axes, label=label, shrink=0.85)
+    return figure
+
+
 def _slice(
     axis,
     solution: Solution,

@@ -15,7 +15,7 @@ from app.durable import write_text
 from app.experiment import Experiment, new_id, open_experiment, write_manifest
 from app.measure import Measurement, measure, with_calibration
 from app.presets import preset as preset_called
-from app.presets import solve_with
+from app.presets import resolved, solve_with
 from app.provenance import provenance
 from app.report import write_report
 from app.results import write_result
@@ -39,7 +39,7 @@ class Reconstruction:
 
 def reconstruct(
     folder: Path,
-    preset: str = "draft",
+    preset: str = "auto",
     *,
     on_stage: OnStage = lambda stage: None,
     on_event: OnEvent | None = None,
@@ -53,8 +53,9 @@ def reconstruct(
     that keeps checkpoints keeps them in `store` and ends soon after `should_stop` says so.
     """
     started = time.perf_counter()
-    solve = preset_called(preset)
     experiment = open_experiment(folder)
+    preset = resolved(preset, experiment.settings.scene)
+    solve = preset_called(preset)
     on_stage("load the calibration")
     scene, calibrated = with_calibration(experiment.settings.scene, experiment.bundle_path)
     on_stage("measure the shift of the pattern")

@@ -2,11 +2,13 @@
 
 import inspect
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, get_args
 
 from app.errors import BadInputError
+from core.geometry import WallName
 from core.problem import Problem
 from core.result import Solution
+from core.scene import Heater, Inlet, Scene, Wall
 from core.solve.draft import solve_draft
 from core.solve.recipes import solve_grid_recipe, solve_paper
 from core.solve.room import RoomSettings, solve_room
@@ -43,6 +45,15 @@ PRESETS: Mapping[str, Solve] = {
     "standard": solve_standard,
     "reference": solve_reference,
 }
+
+
+def resolved(name: str, scene: Scene) -> str:
+    """`auto` is `standard` where something that drives the air and all walls are stated, else `draft`."""
+    if name != "auto":
+        return name
+    driven = any(isinstance(part, Inlet | Heater) for part in scene.boundary)
+    known = {p.wall for p in scene.boundary if isinstance(p, Wall) and p.thermal != "unknown"}
+    return "standard" if driven and known == set(get_args(WallName)) else "draft"
 
 
 def preset(name: str) -> Solve:

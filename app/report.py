@@ -13,7 +13,14 @@ from app.calibration_page import figures, measured_model
 from app.capture import load_capture
 from app.durable import write_text
 from app.experiment import Experiment, open_experiment, read_manifest
-from app.figures import as_data_uri, error_figure, images_figure, shift_figure, slices_figure
+from app.figures import (
+    as_data_uri,
+    error_figure,
+    images_figure,
+    shift_figure,
+    slices_figure,
+    volume_figure,
+)
 from app.results import read_result
 from app.score import score_solution
 from app.shift_files import read_shifts
@@ -134,6 +141,7 @@ def _sections(
             f"Temperature above ambient ({ambient:.2f} K) on the middle planes{arrows}.",
         )
     ]
+    air += _known(solution)
     if truth is not None:
         error = solution.temperature_k - _truth_at(truth, solution)
         air.append(
@@ -147,6 +155,28 @@ def _sections(
         Section("The air", tuple(air)),
         *_calibration(experiment),
     ]
+
+
+def _known(solution: Solution) -> list[Picture]:
+    """How sure the solver is, and where the measurements rather than the model speak."""
+    pictures = []
+    if solution.temperature_std_k is not None:
+        figure = volume_figure(solution, solution.temperature_std_k, "one sigma of T [K]")
+        pictures.append(Picture(as_data_uri(figure), "Standard deviation of the temperature."))
+    if solution.velocity_std_m_s is not None:
+        size = np.linalg.norm(solution.velocity_std_m_s, axis=-1)
+        figure = volume_figure(solution, size, "one sigma of u [m/s]")
+        pictures.append(Picture(as_data_uri(figure), "Standard deviation of the velocity."))
+    if solution.informed is not None:
+        figure = volume_figure(solution, solution.informed, "informed [1]", highest=1.0)
+        pictures.append(
+            Picture(
+                as_data_uri(figure),
+                "Share of the temperature's prior variance that the measurements removed: at 0 the model "
+                "speaks alone.",
+            )
+        )
+    return pictures
 
 
 def _calibration(experiment: Experiment) -> list[Section]:

@@ -18,6 +18,7 @@ _VOLUMES = {
     "pressure_m2_s2": ("p", "m2 s-2", "", "kinematic pressure perturbation"),
     "temperature_std_k": ("T_std", "K", "", "standard deviation of the temperature"),
     "pressure_std_m2_s2": ("p_std", "m2 s-2", "", "standard deviation of the kinematic pressure"),
+    "informed": ("informed", "1", "", "share of the prior variance of T that the measurements removed"),
 }
 _VECTORS = {
     "velocity_m_s": ("u", "velocity"),

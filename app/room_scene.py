@@ -1,5 +1,6 @@
 """From a room volume to a scene: the rig that looks at it, and what an operator would know of it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -29,6 +30,7 @@ from core.scene import (
 )
 
 Information = Literal["paper", "operator", "surveyed"]
+RigName = Literal["paper", "lab"]
 
 # The camera sees this much of the wall beyond the room on each side: a border that no flow moves.
 BORDER = 0.03
@@ -47,6 +49,10 @@ _WALLS: dict[str, WallName] = {
 }
 
 
+# Stand-off, and projector minus camera (x, z): the publication's, and the one that `bench placement` recommends.
+RIG_PLACES: Mapping[RigName, tuple[float, Vector2]] = {"paper": (30.5, (1.0, 0.0)), "lab": (4.0, (1.0, 1.0))}
+
+
 @dataclass(frozen=True)
 class RigOptions:
     """The rig to simulate. Lengths in metres; `baseline_m` is projector minus camera (x, z)."""
@@ -55,8 +61,8 @@ class RigOptions:
     light: Literal["texture", "projector"] = "texture"
     frames: int = 100
     full_well_e: float = 10_000.0
-    stand_off_m: float = 30.5
-    baseline_m: Vector2 = (1.0, 0.0)
+    stand_off_m: float = RIG_PLACES["paper"][0]
+    baseline_m: Vector2 = RIG_PLACES["paper"][1]
     projector_px: tuple[int, int] = (1920, 1200)
     pattern_seed: int = 0
 

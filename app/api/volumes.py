@@ -53,6 +53,7 @@ def volumes_of(solution: Solution) -> dict[str, Volume]:
         "p": ("m2 s-2", "kinematic pressure", solution.pressure_m2_s2),
         "T_std": ("K", "standard deviation of T", solution.temperature_std_k),
         "p_std": ("m2 s-2", "standard deviation of p", solution.pressure_std_m2_s2),
+        "informed": ("1", "share of T's prior variance removed by measurement", solution.informed),
     }
     for index, axis in enumerate("xyz"):
         for stem, words, vectors in (

@@ -15,7 +15,13 @@ def register(cli: typer.Typer) -> None:
 
 def reconstruct(
     experiment: Annotated[Path, typer.Argument(help="Experiment folder.")],
-    preset: Annotated[str, typer.Option(help="How to solve: draft, ...")] = "draft",
+    preset: Annotated[
+        str,
+        typer.Option(
+            help="How to solve: draft, standard, reference, grid, paper; auto is standard where walls and "
+            "supply are stated, else draft."
+        ),
+    ] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Reconstruct the air from the newest reference and flow captures."""

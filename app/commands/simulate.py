@@ -27,10 +27,17 @@ def simulate(
     frames: Annotated[int, typer.Option(min=1, help="Frames averaged in each capture.")] = 100,
     full_well: Annotated[float, typer.Option(help="Full well of a pixel [e-].")] = 10_000.0,
     drift_px: Annotated[float, typer.Option(min=0.0, help="Drift between the two exposures [px].")] = 0.1,
-    stand_off: Annotated[float, typer.Option(help="Camera to back wall [m].")] = 30.5,
+    rig: Annotated[
+        Literal["paper", "lab"],
+        typer.Option(help="Where the optics stand: the paper's 30.5 m, or a lab's 4 m, projector diagonal."),
+    ] = "paper",
+    stand_off: Annotated[
+        float | None, typer.Option(help="Camera to back wall [m]; the rig's by default.")
+    ] = None,
     baseline: Annotated[
-        tuple[float, float], typer.Option(help="Projector minus camera, horizontal and vertical [m].")
-    ] = (1.0, 0.0),
+        tuple[float, float] | None,
+        typer.Option(help="Projector minus camera, horizontal and vertical [m]; the rig's by default."),
+    ] = None,
     noise_free: Annotated[
         bool, typer.Option("--noise-free", help="No shot, read or rounding noise.")
     ] = False,
@@ -38,16 +45,17 @@ def simulate(
 ) -> None:
     """Make a complete experiment from a room volume: scene, calibration, reference and flow captures."""
     from app.rig_settings import SimulatedCameraSettings
-    from app.room_scene import RigOptions
+    from app.room_scene import RIG_PLACES, RigOptions
     from app.simulate import simulate as run
 
+    rig_stand_off_m, rig_baseline_m = RIG_PLACES[rig]
     options = RigOptions(
         camera_px=parse_size(camera_px),
         light=light,
         frames=frames,
         full_well_e=full_well,
-        stand_off_m=stand_off,
-        baseline_m=baseline,
+        stand_off_m=rig_stand_off_m if stand_off is None else stand_off,
+        baseline_m=rig_baseline_m if baseline is None else baseline,
         pattern_seed=seed,
     )
     camera = SimulatedCameraSettings(seed=seed, drift_px=drift_px, noise_free=noise_free)

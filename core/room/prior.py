@@ -3,7 +3,8 @@
 Supply temperature and flow carry the operator's standard deviations, but at least 2 % of the contrast and
 3 % of the flow, since nobody's model of a supply is better. Heat coefficients of walls are a guess: free
 convection gives 1 to 3 W/m2K; where a thermometer tells what leaves, their common level follows from the
-heat balance. Unknown walls are taken as leaking to the ambient temperature.
+heat balance. An unknown wall has the nominal coefficient and a temperature of its own, since the air's
+temperature is linear in it: that of the air is an adiabatic wall. What leaves says their mean.
 """
 
 import equinox as eqx
@@ -22,7 +23,10 @@ from core.scene import Heater, Inlet, Outlet
 
 # 1.6 W/m2K over rho c; within a factor of two (one sigma 0.6 in the logarithm).
 _WALL_HEAT_M_S, _WALL_HEAT_STD = NOMINAL_HEAT_M_S, 0.6
-_UNKNOWN_WALL_STD = 1.2
+# Where walls' temperatures are free, their common coefficient is nearly the same degree of freedom.
+_SHARED_HEAT_STD = 0.3
+# Spread of unknown walls: of their distance from the air, and at least of the supply's contrast.
+_WALL_SHARE, _LEAST_WALL_SHARE = 1.0, 0.2
 _HEATER_HEAT_M_S, _HEATER_HEAT_STD = 2.5e-3, 0.5
 _CLOSURE_STD = 0.25
 _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
@@ -75,12 +79,16 @@ def room_prior(problem: Problem, layout: RoomLayout, *, log_viscosity_std: float
     wall_excess = np.array(
         [0.0 if w is None or w.temperature_k is None else w.temperature_k - ambient for w in walls]
     )
+    free = (layout.heated > 0) & (layout.held == 0)
+    heat_m_s = _WALL_HEAT_M_S if free.any() else _heat_balance_m_s(problem, layout, excess, wall_excess)
+    own, apart_k = _free_walls_k(problem, layout, excess, wall_excess)
+    wall_excess = np.where(free, own, wall_excess)
     mean = RoomParameters(
         _f32(excess),
         jnp.zeros(len(inlets)),
         jnp.float32(0.0),
         _f32(wall_excess),
-        jnp.full(6, np.log(_heat_balance_m_s(problem, layout, excess, wall_excess))),
+        jnp.full(6, np.log(heat_m_s)),
         _f32([h.temperature_k - ambient for h in heaters]),
         jnp.full(len(heaters), np.log(_HEATER_HEAT_M_S)),
         jnp.float32(0.0),
@@ -89,9 +97,9 @@ def room_prior(problem: Problem, layout: RoomLayout, *, log_viscosity_std: float
     std = RoomParameters(
         _f32([max(i.temperature_std_k, _LEAST_SHARE_T * contrast) for i in inlets]),
         _f32([max(i.velocity_std_m_s / s, _LEAST_SHARE_U) for i, s in zip(inlets, speed, strict=True)]),
-        jnp.float32(_WALL_HEAT_STD if layout.heated.any() else 0.0),
+        jnp.float32((_SHARED_HEAT_STD if free.any() else _WALL_HEAT_STD) * float(layout.heated.any())),
+        _f32(np.where(free, max(_WALL_SHARE * apart_k, _LEAST_WALL_SHARE * contrast), 0.0)),
         jnp.zeros(6),
-        _f32(layout.heated * np.where(layout.held > 0, 0.0, _UNKNOWN_WALL_STD)),
         _f32([h.temperature_std_k for h in heaters]),
         jnp.full(len(heaters), _HEATER_HEAT_STD),
         jnp.float32(_CLOSURE_STD),
@@ -115,22 +123,56 @@ def outflow_excess_k(problem: Problem) -> float | None:
     return None
 
 
+def _free_walls_k(
+    problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
+) -> tuple[float, float]:
+    """The one temperature of all unknown walls that closes the heat balance, and its distance from the air.
+
+    Without a thermometer in what leaves it is the ambient one; it stays within the supply's contrast.
+    """
+    leaving = outflow_excess_k(problem)
+    if leaving is None or not layout.inlets:
+        return 0.0, 0.0
+    areas = _heated_areas_m2(layout)
+    free = areas * (layout.held == 0)
+    if free.sum() == 0:
+        return 0.0, 0.0
+    inside = _room_excess_k(problem, leaving)
+    brought = float(np.dot(_supply_m3_s(layout), inlet_excess_k - leaving))
+    known = _WALL_HEAT_M_S * float(((areas - free) * (inside - wall_excess_k)).sum())
+    apart = (brought - known) / (_WALL_HEAT_M_S * float(free.sum()))
+    contrast = max(float(np.abs(inlet_excess_k).max()), abs(inside))
+    apart = float(np.clip(apart, -contrast, contrast))
+    return inside - apart, abs(apart)
+
+
+def _heated_areas_m2(layout: RoomLayout) -> Float[np.ndarray, "6"]:
+    """Area of each wall that passes heat."""
+    grid = layout.grid
+    return (
+        np.array([grid.face_area_m2(w // 2) * np.prod(grid.plane(w // 2)) for w in range(6)]) * layout.heated
+    )
+
+
+def _supply_m3_s(layout: RoomLayout) -> Float[np.ndarray, " inlets"]:
+    """Volume flow of each inlet as stated."""
+    return np.array(
+        [
+            o.inward * v[o.axis] * o.area_m2
+            for o, v in zip(layout.inlets, layout.inlet_velocity_m_s, strict=True)
+        ]
+    )
+
+
 def _heat_balance_m_s(
     problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
 ) -> float:
     """One heat coefficient for all walls that closes the balance, within a factor of four of the guess."""
     leaving = outflow_excess_k(problem)
-    grid = layout.grid
-    areas = (
-        np.array([grid.face_area_m2(w // 2) * np.prod(grid.plane(w // 2)) for w in range(6)]) * layout.heated
-    )
+    areas = _heated_areas_m2(layout)
     if leaving is None or not layout.inlets or layout.heaters or areas.sum() == 0:
         return _WALL_HEAT_M_S
-    normal = [
-        o.inward * v[o.axis] * o.area_m2
-        for o, v in zip(layout.inlets, layout.inlet_velocity_m_s, strict=True)
-    ]
-    brought = float(np.dot(normal, inlet_excess_k - leaving))
+    brought = float(np.dot(_supply_m3_s(layout), inlet_excess_k - leaving))
     inside = _room_excess_k(problem, leaving)
     lost = float((areas * (inside - wall_excess_k)).sum())
     found = brought / lost if abs(lost) > 1e-9 else _WALL_HEAT_M_S

@@ -6,6 +6,7 @@ from jaxtyping import Float
 from core.problem import Problem
 from core.room.fit import Posterior
 from core.room.observe import Observations
+from core.room.openings import stated_walls
 from core.room.prior import Prior
 from core.room.setup import RoomParameters
 from core.scene import Heater, Inlet
@@ -89,10 +90,22 @@ def balances(
 
 def undetermined(problem: Problem) -> list[str]:
     """What the stated information cannot determine."""
-    inlets = any(isinstance(b, Inlet | Heater) for b in problem.scene.boundary)
-    if inlets:
-        return []
-    return [
-        "No inlet or heater is stated: nothing says what drives the air. Velocity is not determined by these "
-        "measurements; the one given is that of still air left to the walls, and is not to be used."
-    ]
+    if not any(isinstance(b, Inlet | Heater) for b in problem.scene.boundary):
+        return [
+            "No inlet or heater is stated: nothing says what drives the air. Velocity is not determined by "
+            "these measurements; the one given is that of still air left to the walls, and is not to be used."
+        ]
+    walls = stated_walls(problem.scene)
+    if all(wall is None for wall in walls.values()):
+        return [
+            "No wall is stated: openings were taken from the plane of known velocity, the walls' temperatures "
+            "were fitted, and anything else that drives the air is missing. Velocity is not determined by "
+            "these measurements: the one given is a guess of the room model. State the walls to use it."
+        ]
+    unknown = [name for name, wall in walls.items() if wall is None or wall.thermal == "unknown"]
+    if unknown:
+        return [
+            f"What passes through {', '.join(unknown)} is not stated and was fitted to the measurements. "
+            "Velocity hinges on it: a stated wall temperature, or 'adiabatic', is worth more than more frames."
+        ]
+    return []

@@ -22,7 +22,7 @@ from core.room.grid import AXES
 from core.room.march import March, MarchSettings, march
 from core.room.model import Flow
 from core.room.observe import Observations, Prediction, observations
-from core.room.openings import stated_walls
+from core.room.plane_openings import with_plane_openings
 from core.room.prior import Prior, outflow_excess_k, room_prior
 from core.room.residue import temperature_correction
 from core.room.room import Room, carried_over, room, seen
@@ -43,14 +43,17 @@ PRESSURE_SCALE = 1.6
 
 @setting
 class RoomSettings:
-    """Grids, how long each march lasts (model seconds), how often the images correct, and the closure."""
+    """Grids, how long each march lasts (model seconds), and how often the images correct.
+
+    The coarse room is corrected while a parameter moves by more than `coarse_step` prior deviations.
+    """
 
     cells: int = 48
     coarse_cells: int = 32
     vertices: int = 64
     rounds: int = 3
-    coarse_rounds: int = 0
-    coarse_rounds_unknown: int = 2
+    coarse_rounds: int = 4
+    coarse_step: float = 1.0
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 45.0
@@ -78,6 +81,7 @@ def solve_room(
     """
     start_s = time.perf_counter()
     tell: Event = on_event or (lambda _: None)
+    problem = with_plane_openings(problem)
     scene = problem.scene
     closure = closure_name(scene)
     coarse, fine = (room(scene, n, closure) for n in (settings.coarse_cells, settings.cells))
@@ -86,13 +90,20 @@ def solve_room(
     prior = room_prior(problem, coarse.layout, log_viscosity_std=settings.log_viscosity_std)
     vector = np.zeros(len(prior.active()))
     base = settled(coarse, prior, problem, settings, vertices, tell)
-    for _ in range(coarse_rounds(scene, settings)):
-        runs = perturbed(coarse, prior, vector, base, settings, vertices)
+    jacobian = perturbed(coarse, prior, vector, base, settings, vertices)
+    moved = False
+    for n in range(settings.coarse_rounds if settings.use_images else 0):
         # No second grid yet: half of the misfit is taken for the grid's.
         half = 0.5 * (data.values()[0] - data.predicted(base.seen))
-        vector = corrected(vector, base, data, runs, half, trusting=True).vector
+        new = corrected(vector, base, data, jacobian, half, trusting=True).vector
+        step = float(np.abs(new - vector).max(initial=0.0))
+        if step < settings.coarse_step:
+            break
+        vector, moved = new, True
         base = attempt(coarse, prior.parameters(vector), base.flow.last, settings.restart_s, vertices, tell)
-    jacobian = perturbed(coarse, prior, vector, base, settings, vertices)
+        tell({"coarse_round": n + 1.0, "moved": step, **fitted(prior, vector)})
+    if moved:
+        jacobian = perturbed(coarse, prior, vector, base, settings, vertices)
     flow = carried_over(base.flow.last, coarse.grid, fine.grid)
     best = first = attempt(fine, prior.parameters(vector), flow, settings.refine_s, vertices, tell)
     grid_difference = data.predicted(best.seen) - data.predicted(jacobian[0])
@@ -112,15 +123,6 @@ def closure_name(scene: Scene) -> str:
     """The closure that a scene asks for; `auto` and `learned` start from k-epsilon."""
     named = {"molecular": "molecular", "given": "constant", "zero_equation": "zero_equation"}
     return named.get(scene.flow.transport, "k_epsilon")
-
-
-def coarse_rounds(scene: Scene, settings: RoomSettings) -> int:
-    """Corrections of the coarse room: more where walls are unknown, none without data."""
-    if not settings.use_images:
-        return 0
-    stated = stated_walls(scene).values()
-    unknown = any(wall is None or wall.thermal == "unknown" for wall in stated)
-    return settings.coarse_rounds_unknown if unknown else settings.coarse_rounds
 
 
 def settled(
