@@ -41,7 +41,7 @@ def plane_openings(plane: PlaneData) -> list[Inlet | Outlet]:
     fastest = float(np.abs(inward).max())
     for sign in (1.0, -1.0):
         through = np.maximum(sign * inward, 0.0)
-        regions, count = ndimage.label(through > _SLOWEST * fastest)
+        regions, count = ndimage.label(through > _SLOWEST * fastest)  # type: ignore[misc]
         for n in range(count):
             own = np.where(regions == n + 1, through, 0.0)
             if fastest > 0 and min(np.ptp(np.nonzero(own)[0]), np.ptp(np.nonzero(own)[1])) > 0:
@@ -49,11 +49,13 @@ def plane_openings(plane: PlaneData) -> list[Inlet | Outlet]:
     return found
 
 
-def _opening(plane: PlaneData, through_m_s: Float[np.ndarray, "first second"], *, supplies: bool):
+def _opening(
+    plane: PlaneData, through_m_s: Float[np.ndarray, "first second"], *, supplies: bool
+) -> Inlet | Outlet:
     """One patch that carries `through_m_s`."""
     core = through_m_s > 0.5 * through_m_s.max()
     (f0, f1), (s0, s1) = (
-        _extent(axis_m, np.max(through_m_s, axis=1 - n), core.any(1 - n))
+        _extent(axis_m, through_m_s.max(axis=1 - n), core.any(axis=1 - n))
         for n, axis_m in enumerate((plane.first_m, plane.second_m))
     )
     lower: Vector2 = (f0, s0)
