@@ -34,7 +34,7 @@ def score_experiment(folder: Path, truth_path: Path, result: Path | None = None)
 
 def score_solution(solution: Solution, truth: RoomVolume) -> dict[str, Any]:
     """T, u, p scores at the truth's vertices; u and p are None where the solution has none."""
-    temperature = _at(truth, solution, solution.temperature_k)
+    temperature = values_at(truth, solution, solution.temperature_k)
     scores: dict[str, Any] = {
         "T": score_temperature(temperature, truth.temperature_k, truth.ambient_k),
         "u": None,
@@ -43,13 +43,17 @@ def score_solution(solution: Solution, truth: RoomVolume) -> dict[str, Any]:
     if solution.velocity_m_s is not None:
         supply = max((abs(i["U"]) for i in truth.case.get("inlets", [])), default=0.0)
         supply = supply or float(np.linalg.norm(truth.velocity_m_s, axis=-1).max())
-        scores["u"] = score_velocity(_at(truth, solution, solution.velocity_m_s), truth.velocity_m_s, supply)
+        scores["u"] = score_velocity(
+            values_at(truth, solution, solution.velocity_m_s), truth.velocity_m_s, supply
+        )
     if solution.pressure_m2_s2 is not None:
-        scores["p"] = score_pressure(_at(truth, solution, solution.pressure_m2_s2), truth.pressure_m2_s2)
+        scores["p"] = score_pressure(
+            values_at(truth, solution, solution.pressure_m2_s2), truth.pressure_m2_s2
+        )
     return scores
 
 
-def _at(truth: RoomVolume, solution: Solution, values: np.ndarray) -> np.ndarray:
+def values_at(truth: RoomVolume, solution: Solution, values: np.ndarray) -> np.ndarray:
     """The solution's values at the truth's vertices (trilinear; the nearest wall outside the box)."""
     axes = (solution.x_m, solution.y_m, solution.z_m)
     points = [

@@ -11,7 +11,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Float, Int
 
-CORRELATED = 4.0
+CORRELATED = 12.0
 _STUDENT_NU = 3.0
 _LONGEST_STEP = 2.0
 

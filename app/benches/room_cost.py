@@ -1,0 +1,111 @@
+"""airlens bench room-cost: what one march of a room costs, and what the derivatives of its parameters cost.
+
+A march runs from air at rest with the plane's profile until the standard preset would stop it. Derivatives
+are restarts of the settled room with one parameter moved each, as the fit makes them; with two threads
+they run beside each other.
+"""
+
+import json
+import resource
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from app.room_scene import RigOptions, room_scene
+from app.synthetic_problem import known_planes
+from app.truth import RoomVolume, read_volume
+from core.problem import Problem
+from core.room.grid import AXES
+from core.room.march import MarchSettings, march
+from core.room.prior import Prior, room_prior
+from core.room.room import Room, room
+from core.room.runs import Attempt, RoomSettings, attempt, first_profile_k, perturbed
+from core.solve.room import closure_name
+
+_VERTICES = (64, 64, 64)
+
+
+def register(bench: typer.Typer) -> None:
+    """Add the command."""
+
+    @bench.command("room-cost")
+    def room_cost(
+        truth: Annotated[Path, typer.Option(help="Room volume (NPZ).")],
+        cells: Annotated[list[int] | None, typer.Option(help="Grids; 32, 48 and 64 by default.")] = None,
+        jacobian: Annotated[
+            bool, typer.Option(help="Also six derivatives, on one thread and on two.")
+        ] = False,
+        as_json: Annotated[bool, typer.Option("--json")] = False,
+    ) -> None:
+        """Processor seconds, memory and derivatives of a march to the steady state."""
+        volume = read_volume(truth)
+        for n in cells or [32, 48, 64]:
+            row = cost_row(volume, n, jacobian=jacobian)
+            typer.echo(json.dumps(row) if as_json else _sentence(row))
+
+
+def cost_row(volume: RoomVolume, cells: int, *, jacobian: bool) -> dict[str, float | str]:
+    """One grid: compile and march times apart, the change that was left, the process' largest memory."""
+    problem = _problem(volume)
+    where = room(problem.scene, cells, closure_name(problem.scene))
+    prior = room_prior(problem, where.layout)
+    settings = RoomSettings()
+    model = where.model(prior.mean)
+    start = where.at_rest(model, first_profile_k(problem, where))
+    began_s = time.process_time()
+    march(start, model, MarchSettings(longest_s=1.0, window_s=1.0, level_ahead_s=0.0))
+    compile_s = time.process_time() - began_s
+    began_s = time.process_time()
+    base = attempt(where, prior.mean, start, settings.settle_s, _VERTICES, lambda _: None)
+    run_s = time.process_time() - began_s
+    row: dict[str, float | str] = {
+        "cells": "x".join(str(where.grid.cells[a]) for a in AXES),
+        "compile_s": compile_s,
+        "run_cpu_s": run_s,
+        "model_s": base.flow.model_s,
+        "steps": float(base.flow.steps),
+        "left_change": base.flow.change,
+        "outcome": base.flow.outcome.name,
+        "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    return row | (_derivatives(where, prior, base, settings, run_s) if jacobian else {})
+
+
+def _derivatives(
+    where: Room, prior: Prior, base: Attempt, settings: RoomSettings, run_s: float
+) -> dict[str, float]:
+    """Cost of the prior's derivatives scaled to six, over one run, and the gain of a second thread."""
+    vector = np.zeros(len(prior.active()))
+    share = 7.0 / (len(vector) + 1)
+    found = {}
+    for threads in (1, 2):
+        wall_s, cpu_s = time.perf_counter(), time.process_time()
+        perturbed(where, prior, vector, base, replace(settings, threads=threads), _VERTICES)
+        found[threads] = (time.perf_counter() - wall_s, time.process_time() - cpu_s)
+    return {
+        "six_derivatives_over_run": share * found[1][1] / run_s,
+        "gain_of_second_thread": found[1][0] / found[2][0],
+    }
+
+
+def _problem(volume: RoomVolume) -> Problem:
+    scene = room_scene(volume, RigOptions(), "surveyed")
+    return Problem(scene, (), known_planes(volume, scene))
+
+
+def _sentence(row: dict[str, float | str]) -> str:
+    text = (
+        f"{row['cells']}: {row['run_cpu_s']:.1f} CPU s for {row['model_s']:.0f} s of air in {row['steps']:.0f} "
+        f"steps ({row['outcome']}, change {row['left_change']:.3f}); compiled in {row['compile_s']:.1f} s; "
+        f"{row['memory_mb']:.0f} MB"
+    )
+    if "gain_of_second_thread" in row:
+        text += (
+            f"; six derivatives {row['six_derivatives_over_run']:.1f} times a run, a second thread "
+            f"{row['gain_of_second_thread']:.2f} times faster"
+        )
+    return text

@@ -1,0 +1,122 @@
+"""What a fitted room says: T, p and u with the last correction, their deviations, and sentences."""
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float
+
+from core.problem import Problem
+from core.result import Solution
+from core.room.fit import Posterior
+from core.room.grid import AXES
+from core.room.observe import Observations, Prediction
+from core.room.prior import Prior
+from core.room.residue import temperature_correction
+from core.room.runs import DIFFERENCE, Attempt
+from core.room.sentences import balances, contradictions, misfit, undetermined
+from core.room.setup import RoomLayout
+from core.uncertainty import Deviation, deviation
+
+# Prior size of the temperature's last correction, as a share of the departure from the profile.
+CORRECTION_SHARE = 0.3
+PRESSURE_SCALE = 1.6
+
+
+class Solved(eqx.Module):
+    """Everything that a solve leaves behind: what a solution and its deviations are made of."""
+
+    problem: Problem
+    data: Observations
+    prior: Prior
+    posterior: Posterior
+    runs: list[Prediction]
+    other: Prediction
+    first: Prediction
+    best: Attempt
+    layout: RoomLayout
+
+
+def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
+    """The room as a result, with the temperature's last correction, deviations and sentences."""
+    best, box, problem = solved.best, solved.problem.scene.room, solved.problem
+    values, _, _ = solved.data.values()
+    residual = values - solved.data.predicted(best.seen)
+    # Pressure follows the level of T, which no departure shows.
+    scales = [
+        departure(best.seen.excess_k),
+        PRESSURE_SCALE * rms(best.seen.pressure_m2_s2),
+        rms(best.seen.velocity_m_s),
+    ]
+    change = temperature_correction(
+        solved.data, best.seen.excess_k, residual, CORRECTION_SHARE * scales[0], scales[0]
+    )
+    free = free_vertices(solved.layout, best.seen.excess_k.shape)
+    excess = best.seen.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
+    variances = (change.prior_variance_k2[:, None, :] * free, change.variance_k2[:, None, :] * free)
+    temperature = _deviation(solved, "excess_k", scales[0], variances)
+    pressure = _deviation(solved, "pressure_m2_s2", scales[1], (0.0, 0.0))
+    velocity = _deviation(solved, "velocity_m_s", scales[2], (0.0, 0.0))
+    x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(excess.shape))
+    return Solution(
+        x,
+        y,
+        z,
+        problem.scene.air.ambient_temperature_k + excess,
+        best.seen.pressure_m2_s2,
+        best.seen.velocity_m_s,
+        temperature.std,
+        pressure.std,
+        velocity.std,
+        temperature.informed,
+        outcome=best.flow.outcome,
+        solver_s=seconds,
+        notes=tuple(sentences(solved, residual, values)),
+    )
+
+
+def sentences(
+    solved: Solved, residual: Float[np.ndarray, " data"], values: Float[np.ndarray, " data"]
+) -> list[str]:
+    """Everything worth telling the operator."""
+    parameters = solved.best.parameters
+    inflow = float(np.sum(np.asarray(solved.layout.inflow_m3_s(parameters))))
+    return [
+        *solved.layout.notes,
+        *undetermined(solved.problem),
+        *contradictions(solved.problem, solved.prior, solved.posterior),
+        *misfit(solved.data, residual, values),
+        *balances(parameters, inflow, solved.best.seen.outflow_excess_k, solved.problem),
+    ]
+
+
+def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.ndarray, "vx vy vz"]:
+    """1 where a vertex is not on a wall of stated temperature."""
+    free = np.ones(shape)
+    for wall in np.flatnonzero(layout.held):
+        free[tuple((-1 if wall % 2 else 0) if a == wall // 2 else slice(None) for a in AXES)] = 0.0
+    return free
+
+
+def departure(field: Float[np.ndarray, "vx vy vz"]) -> float:
+    """Rms of a field's departure from its profile of height, walls left out."""
+    field = field[1:-1, 1:-1, 1:-1]
+    return float(np.sqrt(np.mean((field - field.mean((0, 1))) ** 2)))
+
+
+def rms(field: Float[np.ndarray, "..."]) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(field))))
+
+
+def _deviation(
+    solved: Solved, name: str, scale: float, extra: tuple[np.ndarray | float, np.ndarray | float]
+) -> Deviation:
+    start = getattr(solved.runs[0], name)
+    moved = [(getattr(run, name) - start) / DIFFERENCE for run in solved.runs[1:]]
+    between = [getattr(solved.first, name) - start, getattr(solved.other, name) - start]
+    if between[1].ndim == 3:
+        # Closures pass walls' heat differently; the level that follows is measured.
+        between[1] = between[1] - between[1].mean((0, 1))
+        if solved.data.planes:
+            # The profile of height is measured by the plane; only departures from it are the grid's.
+            between[0] = between[0] - between[0].mean((0, 1))
+    return deviation(moved, solved.posterior.covariance, (between[0], between[1]), scale, extra)

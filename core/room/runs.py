@@ -1,0 +1,146 @@
+"""Marches of a room as a fit needs them: settled from nothing, restarted, and moved one parameter at a time."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float
+
+from core.problem import Problem
+from core.room.boundary import set_normal
+from core.room.march import March, MarchSettings, march
+from core.room.model import Flow
+from core.room.observe import Prediction
+from core.room.prior import Prior, outflow_excess_k
+from core.room.room import Room, room, seen
+from core.room.setup import RoomParameters
+from core.scene import Inlet
+from core.setting import setting
+
+Event = Callable[[dict[str, float]], object]
+
+# Steps of the finite differences, in prior deviations: beyond the march's own wobble, short of curvature.
+DIFFERENCE = 0.5
+
+
+@setting
+class RoomSettings:
+    """Grids, how long each march lasts (model seconds), and how often the images correct.
+
+    The coarse room is corrected while a parameter moves by more than `coarse_step` prior deviations and
+    the misfit falls below `worthwhile` of what it was: a coarse grid's own error must not move the rest.
+    """
+
+    cells: int = 48
+    coarse_cells: int = 32
+    vertices: int = 64
+    rounds: int = 3
+    coarse_rounds: int = 4
+    coarse_step: float = 1.0
+    worthwhile: float = 0.8
+    settle_s: float = 150.0
+    restart_s: float = 60.0
+    refine_s: float = 45.0
+    final_s: float = 60.0
+    use_images: bool = True
+    log_viscosity_std: float = 0.0
+    threads: int = 2
+
+
+class Attempt(eqx.Module):
+    """One march of a room: its parameters, how it went, and what measurements would see."""
+
+    parameters: RoomParameters
+    flow: March
+    seen: Prediction
+
+
+def settled(
+    coarse: Room,
+    prior: Prior,
+    problem: Problem,
+    settings: RoomSettings,
+    vertices: tuple[int, int, int],
+    tell: Event,
+) -> Attempt:
+    """The coarse room as stated, marched from a measured profile or the leaving air's temperature."""
+    model = coarse.model(prior.mean)
+    flow = coarse.at_rest(model, first_profile_k(problem, coarse))
+    return attempt(coarse, prior.mean, flow, settings.settle_s, vertices, tell)
+
+
+def first_profile_k(problem: Problem, coarse: Room) -> Float[np.ndarray, " nz"]:
+    """Excess temperature of each layer to start from: a plane's, else what leaves, else half the supply's."""
+    heights = coarse.grid.centres_m(2)
+    ambient = problem.scene.air.ambient_temperature_k
+    for plane in problem.planes:
+        if plane.wall[0] != "z":
+            still = np.abs(plane.velocity_m_s).max(axis=2) < 0.02 * np.abs(plane.velocity_m_s).max()
+            still[[0, -1]] = False
+            count = np.maximum(still.sum(0), 1)
+            profile = np.where(still, plane.temperature_k - ambient, 0.0).sum(0) / count
+            return np.interp(heights, plane.second_m[still.any(0)], profile[still.any(0)])
+    leaving = outflow_excess_k(problem)
+    if leaving is None:
+        inlets = [b for b in problem.scene.boundary if isinstance(b, Inlet)]
+        leaving = 0.5 * float(np.mean([i.temperature_k - ambient for i in inlets])) if inlets else 0.0
+    return np.full(len(heights), leaving)
+
+
+def attempt(
+    where: Room,
+    parameters: RoomParameters,
+    flow: Flow,
+    seconds: float,
+    vertices: tuple[int, int, int],
+    tell: Event,
+) -> Attempt:
+    """March `flow` under these parameters and look at its mean; seconds are those of the reference room."""
+    model = where.model(parameters)
+    flow = eqx.tree_at(lambda f: f.velocity, flow, set_normal(flow.velocity, model.boundary))
+    pace = where.pace
+    timing = MarchSettings(
+        longest_s=seconds * pace,
+        window_s=min(5.0, seconds) * pace,
+        settle_s=0.15 * seconds * pace,
+        level_ahead_s=20.0 * pace,
+    )
+    done = march(flow, model, timing, on_window=tell)
+    return Attempt(parameters, done, seen(done.mean, model, vertices))
+
+
+def perturbed(
+    where: Room,
+    prior: Prior,
+    vector: Float[np.ndarray, " active"],
+    base: Attempt,
+    settings: RoomSettings,
+    vertices: tuple[int, int, int],
+) -> list[Prediction]:
+    """The settled room again, first as it is and then with one parameter moved after the other."""
+    steps = [np.zeros(len(prior.active())), *(np.eye(len(prior.active())) * DIFFERENCE)]
+
+    def one(step: Float[np.ndarray, " active"]) -> Prediction:
+        quiet: Event = lambda _: None  # noqa: E731
+        return attempt(
+            where, prior.parameters(vector + step), base.flow.last, settings.restart_s, vertices, quiet
+        ).seen
+
+    with ThreadPoolExecutor(settings.threads) as pool:
+        return list(pool.map(one, steps))
+
+
+def otherwise_closed(
+    where: Room,
+    parameters: RoomParameters,
+    base: Attempt,
+    settings: RoomSettings,
+    vertices: tuple[int, int, int],
+) -> Prediction:
+    """The settled room again under another closure: what turbulence modelling leaves open."""
+    name = "zero_equation" if where.closure != "zero_equation" else "constant"
+    last = base.flow.last
+    flow = Flow(last.velocity, last.excess_k, last.pressure_m2_s2, None)
+    another = room(where.scene, settings.coarse_cells, name)
+    return attempt(another, parameters, flow, settings.restart_s, vertices, lambda _: None).seen
