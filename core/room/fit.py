@@ -11,7 +11,9 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Float, Int
 
-CORRELATED = 12.0
+CORRELATED = 4.0
+# Errors of grid and closure reach over whole jets: the posterior counts that many times fewer data again.
+_COHERENT = 3.0
 _STUDENT_NU = 3.0
 _LONGEST_STEP = 2.0
 
@@ -36,7 +38,7 @@ def gauss_newton(
 
     `trusting` keeps the prior Gaussian: for first steps, when the model is still far from the data.
     """
-    new, normal = vector, np.eye(len(vector))
+    new, normal, prior = vector, np.eye(len(vector)), np.ones(len(vector))
     for _ in range(6):
         prior = (_STUDENT_NU + 1.0) / (_STUDENT_NU + (0.0 if trusting else 1.0) * new**2)
         normal = (jacobian.T / variance) @ jacobian + np.diag(prior)
@@ -44,7 +46,8 @@ def gauss_newton(
         step = np.linalg.solve(normal, gradient)
         step = np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
         new = vector + step
-    return Posterior(new, np.linalg.inv(normal), np.sqrt(variance))
+    data = normal - np.diag(prior)
+    return Posterior(new, np.linalg.inv(data / _COHERENT + np.diag(prior)), np.sqrt(variance))
 
 
 def weighted_variance(

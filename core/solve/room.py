@@ -14,7 +14,7 @@ from jaxtyping import Float
 from core.problem import Problem
 from core.result import Solution
 from core.room.answer import Solved, solution
-from core.room.fit import Posterior, gauss_newton, spread, weighted_variance
+from core.room.fit import Posterior, gauss_newton, weighted_variance
 from core.room.observe import Observations, Prediction, observations
 from core.room.plane_openings import with_plane_openings
 from core.room.prior import Prior, room_prior
@@ -141,11 +141,11 @@ def corrected(
 
 
 def misfit_ratio(data: Observations, new: Attempt, old: Attempt) -> float:
-    """Rms misfit of one attempt over another's, mean over the kinds of data."""
-    values, _, group = data.values()
-    left = [np.abs(values - data.predicted(a.seen)) for a in (new, old)]
-    ratios = [spread(left[0][group == g]) / max(spread(left[1][group == g]), 1e-30) for g in np.unique(group)]
-    return float(np.mean(ratios)) if ratios else 1.0
+    """Rms misfit of one attempt over another's, each kind of data weighted by the old one's."""
+    values, variance, group = data.values()
+    after, before = (values - data.predicted(a.seen) for a in (new, old))
+    weights = weighted_variance(variance, group, before, before)
+    return float(np.sqrt(np.sum(after**2 / weights) / max(np.sum(before**2 / weights), 1e-30)))
 
 
 def fitted(prior: Prior, vector: Vector) -> dict[str, float]:
