@@ -10,6 +10,7 @@ import sys
 import typer
 
 import app.commands
+from app.compilation_cache import use_compilation_cache
 from app.errors import AirlensError, BadInputError
 from core.setting import SettingError
 from drivers.errors import DeviceError
@@ -30,6 +31,7 @@ def create_cli() -> typer.Typer:
 
 def main() -> None:
     """Run the command line; every foreseen error ends in one sentence on standard error."""
+    use_compilation_cache()
     try:
         create_cli()()
     except (BadInputError, SettingError) as error:

@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from app.room_scene import RigOptions, room_scene
-from app.synthetic_problem import TRACED_STEPS, fine_field, known_planes
+from app.synthetic_problem import fine_field, known_planes, tracer_of
 from app.truth import RoomVolume
 from core.fields import GridField
 from core.problem import ImagePair, Problem
-from core.rays.straight import StraightTracer
+from core.rays import NonlinearTracer
 from core.render.geometry import PixelGeometry, pixel_geometry
 from core.render.light import pattern_image, sample_pattern
 from core.render.shift import pattern_offset_px, wall_offset_m
@@ -60,7 +60,7 @@ def _images(
     row, column = np.mgrid[0:PIXELS, 0:PIXELS]
     positions = (np.stack([column, row], -1)[:, :, None] + offsets).reshape(-1, 2)
     geometry = pixel_geometry(scene, 0, positions)
-    tracer = StraightTracer(TRACED_STEPS, scene.air.ambient_refractivity)
+    tracer = tracer_of(scene)
     reference, flow = _luminance(jnp.asarray(pattern_image(scene)), geometry, field, tracer)
     shape = (PIXELS, PIXELS, SAMPLES)
     return (
@@ -70,7 +70,7 @@ def _images(
 
 
 @eqx.filter_jit
-def _luminance(pattern, geometry: PixelGeometry, field: GridField, tracer: StraightTracer):
+def _luminance(pattern, geometry: PixelGeometry, field: GridField, tracer: NonlinearTracer):
     shift_px = pattern_offset_px(geometry, wall_offset_m(geometry, field, tracer))
     still = sample_pattern(pattern, geometry.cell, geometry.fraction_px) * geometry.weight
     moved = sample_pattern(pattern, geometry.cell, geometry.fraction_px + shift_px) * geometry.weight

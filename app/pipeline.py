@@ -21,7 +21,9 @@ from app.report import write_report
 from app.results import write_result
 from app.shift_files import write_shifts
 from core.result import Solution
+from core.solve.check import check_problem
 from core.solve.checkpoint import CheckpointStore
+from core.solve.recipes import regime_for
 
 OnStage = Callable[[str], object]
 OnEvent = Callable[[dict[str, Any]], object]
@@ -60,6 +62,7 @@ def reconstruct(
     scene, calibrated = with_calibration(experiment.settings.scene, experiment.bundle_path)
     on_stage("measure the shift of the pattern")
     measurement = measure(experiment, scene)
+    check_problem(measurement.problem, regime_for(measurement.problem))
     on_stage("check the rendered reference against the captured one")
     checked = rendered_agreement(scene, measurement.references)
     on_stage(f"solve ({preset})")

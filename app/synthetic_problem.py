@@ -1,11 +1,12 @@
 """A reconstruction problem out of a room volume: what a rig would have measured, without taking pictures.
 
 The shifts are traced through the volume resampled twice as fine, by another operator than the
-reconstruction's (ray tracing with many steps through a smooth interpolation, nine rays a window, not a
+reconstruction's (bent rays traced in many steps through a smooth interpolation, nine rays a window, not a
 matrix on the unknowns' vertices). The noise is that of the rig: each window's information matrix from
 the rendered reference image and the camera's noise, one random draw a window.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 import equinox as eqx
@@ -20,7 +21,7 @@ from app.truth import RoomVolume
 from core.displacement import derivative_filter
 from core.fields import GridField
 from core.problem import PlaneData, Problem, ShiftMeasurement
-from core.rays.straight import StraightTracer
+from core.rays import NonlinearTracer
 from core.render import PixelGeometry, pixel_geometry, render_reference
 from core.render.shift import wall_offset_m
 from core.scene import PlaneField, Scene
@@ -66,6 +67,11 @@ def fine_field(volume: RoomVolume, scene: Scene) -> GridField:
     return GridField(scene.room.lower_m, scene.room.upper_m, jnp.asarray(excess, jnp.float32))
 
 
+def tracer_of(scene: Scene) -> NonlinearTracer:
+    """How the truth is traced."""
+    return NonlinearTracer(TRACED_STEPS, scene.air.ambient_refractivity)
+
+
 def _measure(volume: RoomVolume, scene: Scene, window_px: int, seed: int) -> ShiftMeasurement:
     centres = _centres(scene, window_px)
     exact_px = _traced(scene, fine_field(volume, scene), centres, window_px)
@@ -91,7 +97,7 @@ def _traced(
 ) -> Float[np.ndarray, "windows 2"]:
     """Mean displacement [px] of a window's rays: minus the wall offset, seen by the camera."""
     steps = (np.arange(_RAYS_A_WINDOW) - (_RAYS_A_WINDOW - 1) / 2) * window_px / _RAYS_A_WINDOW
-    tracer = StraightTracer(TRACED_STEPS, scene.air.ambient_refractivity)
+    tracer = tracer_of(scene)
     total = np.zeros_like(centres)
     for down in steps:
         for right in steps:
@@ -101,7 +107,7 @@ def _traced(
 
 
 @eqx.filter_jit
-def _seen_px(geometry: PixelGeometry, field: GridField, tracer: StraightTracer):
+def _seen_px(geometry: PixelGeometry, field: GridField, tracer: NonlinearTracer):
     offset_m = wall_offset_m(geometry, field, tracer)
     pattern_px = jnp.einsum("rij,rj->ri", geometry.pattern_from_wall, offset_m)
     inverse = jax.vmap(jnp.linalg.inv)(_safe(geometry.pattern_from_pixel))
@@ -116,7 +122,8 @@ def _safe(matrix):
 
 def _information(scene: Scene, window_px: int) -> Float[np.ndarray, "windows 2 2"]:
     """Sums of the reference's gradients over the variance of a difference of two mean images."""
-    reference = _reference(scene)
+    # What is known at the boundary does not change the picture.
+    reference = _reference(replace(scene, boundary=()))
     view = scene.views[0]
     taps = derivative_filter()
     slopes = [ndimage.correlate1d(reference, taps, axis=axis, mode="nearest") for axis in (1, 0)]

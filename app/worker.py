@@ -18,6 +18,7 @@ from pathlib import Path
 
 import psutil
 
+from app.compilation_cache import use_compilation_cache
 from app.durable import make_folder, write_json
 from app.errors import AirlensError
 from app.jobs import kinds
@@ -54,6 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _attempt(folder: JobFolder, owner: Owner, stop: threading.Event) -> int:
     status, message = FAILED, ""
+    use_compilation_cache()
     try:
         compute(folder, owner, stop)
         status = DONE

@@ -106,6 +106,17 @@ def errors(found: Solution, truth: RoomVolume) -> dict[str, Any]:
     return {name: None if value is None else round(float(value), 4) for name, value in named.items()}
 
 
+def trivial(found: Solution, truth: RoomVolume) -> dict[str, Any]:
+    """What costs nothing: the inlet plane carried along x (T, p) and still air (u)."""
+    scores = score_solution(found, truth)
+    named = {
+        "trivial_T_K": scores["T"]["trivial"]["inlet_plane"],
+        "trivial_p": scores["p"]["trivial"]["inlet_plane"],
+        "trivial_u": scores["u"]["trivial"]["zero"],
+    }
+    return {name: round(float(value), 4) for name, value in named.items()}
+
+
 def _ratio(lines: list[dict[str, Any]]) -> dict[str, Any]:
     """How much sooner the grid has the error that the network ends with."""
     grid = next(line for line in lines if line["method"] == "grid")

@@ -12,8 +12,9 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from app.benches.reconstruct import errors
+from app.benches.reconstruct import errors, trivial
 from app.durable import durable_path
+from app.errors import BadInputError
 from app.paper_setup import paper_problem
 from app.room_scene import RigOptions
 from app.synthetic_problem import synthetic_problem
@@ -34,57 +35,93 @@ def register(bench: typer.Typer) -> None:
 
 def regimes(
     volume: Annotated[Path, typer.Argument(help="Room volume (NPZ) that is the truth.")],
-    out: Annotated[Path, typer.Option(help="Folder for lines.jsonl and the pictures.")] = Path("bench"),
+    out: Annotated[Path, typer.Option(help="Folder for the JSON lines and the pictures.")] = Path("bench"),
     setup: Annotated[str, typer.Option(help="paper, texture or projector.")] = "paper",
     information: Annotated[str, typer.Option(help="paper, operator or surveyed.")] = "paper",
     method: Annotated[str, typer.Option(help="grid or mlp.")] = "grid",
-    cells: Annotated[int, typer.Option(help="Cells an axis of the grid.")] = 32,
-    network_s: Annotated[float, typer.Option(help="Seconds for the network.")] = 120.0,
+    cells: Annotated[int, typer.Option(help="Cells an axis of the grid.")] = 64,
+    network_s: Annotated[float, typer.Option(help="Seconds for the network, for each regime.")] = 120.0,
+    width: Annotated[int, typer.Option(help="Width of the network's four layers.")] = 128,
+    batch: Annotated[int, typer.Option(help="Collocation points a step; the paper's is 8192.")] = 8192,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON line a regime.")] = False,
 ) -> None:
     """Each regime of losses on one volume: errors of T, p, u, and pictures of truth, prediction and error."""
     truth = read_volume(volume)
-    if setup == "paper":
-        problem = paper_problem(truth, seed=0)
-    else:
-        options = RigOptions(light=setup)  # type: ignore[arg-type]
-        problem = synthetic_problem(truth, options, information, window_px=32, seed=0)  # type: ignore[arg-type]
-    lines, found = [], {}
+    problem = _problem(truth, setup, information)
+    name = f"regimes_{setup}_{information}_{method}"
+    lines: list[dict[str, Any]] = []
+    found: dict[Regime, Solution] = {}
     for regime in REGIMES:
         began = time.process_time()
-        found[regime] = _solve(problem, regime, method, cells, network_s)
+        found[regime] = _solve(problem, regime, method, cells, MlpSettings(width=width), batch, network_s)
+        cpu_s = round(time.process_time() - began, 1)
         point = {"setup": setup, "information": information, "method": method, "regime": regime}
-        cpu_s = round(time.process_time() - began, 2)
-        lines.append({**point, **errors(found[regime], truth), "cpu_s_with_compilation": cpu_s})
+        cost = {"solver_s": round(found[regime].solver_s, 1), "cpu_s_with_compilation": cpu_s}
+        ended = {"outcome": found[regime].outcome.name, "iterations": _iterations(found[regime])}
+        lines.append(
+            {**point, **errors(found[regime], truth), **trivial(found[regime], truth), **cost, **ended}
+        )
         typer.echo(json.dumps(lines[-1]) if as_json else "  ".join(f"{k} {v}" for k, v in lines[-1].items()))
-    with durable_path(out / f"regimes_{setup}_{method}.jsonl") as path:
-        path.write_text("".join(json.dumps(line) + "\n" for line in lines))
-    draw(out / f"regimes_{setup}_{method}.png", truth, found)
+        with durable_path(out / f"{name}.jsonl") as path:
+            path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    draw(out / f"{name}.png", truth, found)
 
 
-def _solve(problem: Problem, regime: Regime, method: str, cells: int, network_s: float) -> Solution:
+def _problem(truth: RoomVolume, setup: str, information: str) -> Problem:
+    if setup == "paper":
+        return paper_problem(truth, seed=0)
+    if setup not in ("texture", "projector") or information not in ("paper", "operator", "surveyed"):
+        raise BadInputError(
+            f"Set-up {setup!r} with information {information!r}: expected paper, texture or projector with "
+            "paper, operator or surveyed."
+        )
+    return synthetic_problem(truth, RigOptions(light=setup), information, window_px=32, seed=0)  # type: ignore[arg-type]
+
+
+def _solve(
+    problem: Problem,
+    regime: Regime,
+    method: str,
+    cells: int,
+    network: MlpSettings,
+    batch: int,
+    network_s: float,
+) -> Solution:
     if method == "grid":
-        return solve_grid(problem, GridSettings(regime=regime, cells=cells, coarsest=min(cells, 32)))
+        return solve_grid(problem, GridSettings(regime=regime, cells=cells, coarsest=min(cells, 16)))
+    share = batch / 8192
     settings = MlpSolveSettings(
         regime=regime,
-        network=MlpSettings(),
+        network=network,
+        collocation_points=batch,
+        pixels=round(5000 * share),
+        boundary_points=round(4096 * share),
         loop=LoopSettings(time_limit_s=network_s),
     )
     return solve_mlp(problem, settings)
 
 
-def draw(path: Path, truth: RoomVolume, found: dict[Regime, Solution]) -> None:
-    """Truth and each regime's temperature in the middle plane across the view; the error below."""
-    import matplotlib
+def _iterations(found: Solution) -> int:
+    """Steps of the network; conjugate gradients of all the grid's steps."""
+    if not found.history:
+        return 0
+    last = found.history[-1]
+    return int(last.get("step", sum(row.get("cg_iterations", 0.0) for row in found.history)))
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
+
+def draw(path: Path, truth: RoomVolume, found: dict[Regime, Solution]) -> None:
+    """Truth, each regime's prediction and its error, as in the paper's figure: T and speed, middle plane."""
+    from matplotlib.figure import Figure
 
     middle = len(truth.y_m) // 2
-    exact = truth.temperature_k[:, middle]
-    low, high = np.percentile(exact, [1, 99])
+    exact = {
+        "T": truth.temperature_k[:, middle],
+        "|u|": np.linalg.norm(truth.velocity_m_s[:, middle], axis=-1),
+    }
+    predicted = {regime: _planes(solution, truth, truth.y_m[middle]) for regime, solution in found.items()}
     columns = 1 + len(found)
-    figure, axes = pyplot.subplots(2, columns, figsize=(3 * columns, 5), constrained_layout=True)
+    figure = Figure(figsize=(3 * columns, 9.2), layout="constrained")
+    axes = figure.subplots(4, columns)
     extent = (truth.x_m[0], truth.x_m[-1], truth.z_m[0], truth.z_m[-1])
 
     def show(place: Any, values: np.ndarray, title: str, limits: tuple[float, float], colours: str) -> None:
@@ -94,18 +131,22 @@ def draw(path: Path, truth: RoomVolume, found: dict[Regime, Solution]) -> None:
         place.set_title(title, fontsize=9)
         figure.colorbar(image, ax=place, shrink=0.7)
 
-    show(axes[0, 0], exact, "truth [K]", (low, high), "inferno")
-    axes[1, 0].axis("off")
-    for column, (regime, solution) in enumerate(found.items(), start=1):
-        predicted = _plane(solution, truth, truth.y_m[middle])
-        show(axes[0, column], predicted, regime, (low, high), "inferno")
-        show(axes[1, column], np.abs(predicted - exact), "error [K]", (0.0, 2.0), "viridis")
+    for row, (name, unit, colours, worst) in enumerate(
+        (("T", "K", "inferno", 2.0), ("|u|", "m/s", "viridis", 0.3))
+    ):
+        low, high = (float(v) for v in np.percentile(exact[name], [1, 99]))
+        show(axes[2 * row, 0], exact[name], f"{name}, truth [{unit}]", (low, high), colours)
+        axes[2 * row + 1, 0].axis("off")
+        for column, regime in enumerate(found, start=1):
+            plane = predicted[regime][name]
+            show(axes[2 * row, column], plane, regime, (low, high), colours)
+            error = np.abs(plane - exact[name])
+            show(axes[2 * row + 1, column], error, f"error [{unit}]", (0.0, worst), "magma")
     with durable_path(path) as temporary:
-        figure.savefig(temporary, dpi=110)
-    pyplot.close(figure)
+        figure.savefig(temporary, format="png", dpi=80)
 
 
-def _plane(solution: Solution, truth: RoomVolume, y_m: float) -> np.ndarray:
+def _planes(solution: Solution, truth: RoomVolume, y_m: float) -> dict[str, np.ndarray]:
     from scipy.interpolate import RegularGridInterpolator
 
     axes = (solution.x_m, solution.y_m, solution.z_m)
@@ -115,4 +156,10 @@ def _plane(solution: Solution, truth: RoomVolume, y_m: float) -> np.ndarray:
         indexing="ij",
     )
     points = np.stack([x, np.full_like(x, y_m), z], axis=-1)
-    return RegularGridInterpolator(axes, np.asarray(solution.temperature_k, np.float64))(points)
+
+    def at(values: np.ndarray) -> np.ndarray:
+        return RegularGridInterpolator(axes, np.asarray(values, np.float64))(points)
+
+    if solution.velocity_m_s is None:
+        raise BadInputError("This solver finds no velocity; compare regimes with grid or mlp.")
+    return {"T": at(solution.temperature_k), "|u|": np.linalg.norm(at(solution.velocity_m_s), axis=-1)}

@@ -2,9 +2,12 @@
 
 from collections.abc import Sequence
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+
+_BATCHED_UP_TO = 40
 
 
 def interpolation_matrix(
@@ -29,10 +32,46 @@ def on_axes(
     values: Float[Array, "_ _ _"], matrices: Sequence[Float[np.ndarray, "_ _"]]
 ) -> Float[Array, "_ _ _"]:
     """Interpolate onto a tensor grid: one matrix an axis, from `interpolation_matrix`."""
-    for axis, matrix in enumerate(matrices):
-        product = jnp.tensordot(jnp.asarray(matrix, values.dtype), values, axes=(1, axis))
-        values = jnp.moveaxis(product, 0, axis)
-    return values
+    return _contracted(values[None], [matrix[None] for matrix in matrices])[0]
+
+
+def on_axes_together(
+    components: Sequence[Float[Array, "_ _ _"]], matrices: Sequence[Sequence[Float[np.ndarray, "_ _"]]]
+) -> list[Float[Array, "_ _ _"]]:
+    """Interpolate several arrays, each with its own three matrices.
+
+    Small ones as three batched products, filled up with zeros to one shape: half the time to compile, and
+    as fast up to some 32^3 targets. Twice as slow at 64^3, which are done one by one.
+    """
+    if max(matrix.shape[0] for own in matrices for matrix in own) > _BATCHED_UP_TO:
+        return [on_axes(c, own) for c, own in zip(components, matrices, strict=True)]
+    knots = [max(c.shape[axis] for c in components) for axis in range(3)]
+    targets = [max(m[axis].shape[0] for m in matrices) for axis in range(3)]
+    stacked = jnp.stack(
+        [jnp.pad(c, [(0, n - size) for n, size in zip(knots, c.shape, strict=True)]) for c in components]
+    )
+    padded = []
+    for axis in range(3):
+        together = np.zeros((len(components), targets[axis], knots[axis]))
+        for place, own in enumerate(matrices):
+            rows, columns = own[axis].shape
+            together[place, :rows, :columns] = own[axis]
+        padded.append(together)
+    found = _contracted(stacked, padded)
+    shapes = [tuple(matrix.shape[0] for matrix in own) for own in matrices]
+    return [found[place, :nx, :ny, :nz] for place, (nx, ny, nz) in enumerate(shapes)]
+
+
+def _contracted(
+    values: Float[Array, "fields _ _ _"], matrices: Sequence[Float[np.ndarray, "fields _ _"]]
+) -> Float[Array, "fields _ _ _"]:
+    """One axis after the other, that which shrinks most first; each product puts its axis last."""
+    held = [0, 1, 2]
+    for axis in sorted(held, key=lambda a: matrices[a].shape[1] / matrices[a].shape[2]):
+        matrix = jnp.asarray(matrices[axis], values.dtype)
+        values = jax.lax.dot_general(values, matrix, (((1 + held.index(axis),), (2,)), ((0,), (0,))))
+        held = [a for a in held if a != axis] + [axis]
+    return jnp.transpose(values, (0, *(1 + held.index(axis) for axis in range(3))))
 
 
 def at_points(

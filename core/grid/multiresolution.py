@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from core.boussinesq import Flow, Numbers, Residuals
-from core.grid.interpolation import on_axes
+from core.grid.interpolation import on_axes_together
 from core.grid.residuals import as_residuals, discrete_residuals
 from core.grid.staggered import Staggered, StaggeredGrid
 from core.representation import Spans, positions
@@ -68,8 +68,7 @@ class GridFields(eqx.Module):
 
 def prolong(state: Staggered, coarse: StaggeredGrid, fine: StaggeredGrid) -> Staggered:
     """Linear interpolation of every unknown onto a finer grid."""
-    matrices = coarse.matrices(fine.axes)
-    return Staggered.of([on_axes(c, m) for c, m in zip(state.components, matrices, strict=True)])
+    return Staggered.of(on_axes_together(state.components, coarse.matrices(fine.axes)))
 
 
 def zero_multigrid(grid: StaggeredGrid, *, coarsest: int = 4) -> MultiGrid:

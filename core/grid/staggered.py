@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from core.boussinesq import Flow
-from core.grid.interpolation import at_points, interpolation_matrix, on_axes
+from core.grid.interpolation import at_points, interpolation_matrix, on_axes, on_axes_together
 
 Corner = tuple[float, float, float]
 Shape = tuple[int, int, int]
@@ -76,10 +76,7 @@ class StaggeredGrid(eqx.Module):
 
     def on_grid(self, state: Staggered, axes: Axes) -> Flow:
         """T, p, u on a tensor grid of points, nondimensional."""
-        values = [
-            on_axes(component, matrices)
-            for component, matrices in zip(state.components, self.matrices([axes] * 5), strict=True)
-        ]
+        values = on_axes_together(state.components, self.matrices([axes] * 5))
         return Flow(values[0], values[1], jnp.stack(values[2:], axis=-1))
 
     def at(self, state: Staggered, points: Float[Array, "points 3"]) -> Flow:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from core.problem import Problem, ShiftMeasurement
+from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.scene import Inlet, Outlet, Wall
 from core.setting import SettingError
 from core.solve.regime import Regime
@@ -14,6 +14,7 @@ def check_problem(problem: Problem, regime: Regime) -> None:
         _check_shifts(problem)
     _check_planes(problem)
     _check_patches(problem)
+    _check_supply(problem)
     _check_sensors(problem)
     if not problem.planes and not problem.scene.boundary and not problem.sensors:
         raise SettingError(
@@ -106,6 +107,41 @@ def _check_patches(problem: Problem) -> None:
                 f"The inlet on {inlet.patch.wall} has velocity {inlet.velocity_m_s} m/s, which leaves "
                 "the room. Turn its sign, or call it an outlet."
             )
+
+
+def _check_supply(problem: Problem) -> None:
+    """Inlets against what a plane measured there, and against a room that lets nothing out."""
+    scene = problem.scene
+    inlets = [item for item in scene.boundary if isinstance(item, Inlet)]
+    for plane in problem.planes:
+        for inlet in (i for i in inlets if i.patch.wall == plane.wall):
+            _check_inlet_on_plane(inlet, plane, scene.air.ambient_temperature_k)
+    closed = {item.wall for item in scene.boundary if isinstance(item, Wall) and item.no_slip}
+    lets_out = problem.planes or any(isinstance(item, Outlet) for item in scene.boundary)
+    if inlets and not lets_out and len(closed) == 6:
+        raise SettingError(
+            f"Air enters through {len(inlets)} inlet(s), all six walls are closed, and there is no outlet: mass "
+            "cannot be conserved. Add the outlet, or leave out a wall that is not closed."
+        )
+
+
+def _check_inlet_on_plane(inlet: Inlet, plane: PlaneData, ambient_k: float) -> None:
+    """The middle half of the patch: a measured edge is smeared."""
+    inside = []
+    for axis_m, low, high in zip(
+        (plane.first_m, plane.second_m), inlet.patch.lower_m, inlet.patch.upper_m, strict=True
+    ):
+        quarter = (high - low) / 4
+        inside.append((axis_m > low + quarter) & (axis_m < high - quarter))
+    found = plane.temperature_k[np.ix_(*inside)]
+    if found.size == 0:
+        return
+    measured_k = float(np.median(found))
+    if abs(measured_k - inlet.temperature_k) > 1.0 + 0.25 * abs(inlet.temperature_k - ambient_k):
+        raise SettingError(
+            f"The inlet on {plane.wall} is stated at {inlet.temperature_k:g} K, and the plane {plane.wall} has "
+            f"{measured_k:g} K in it: they contradict each other. Correct the one that is wrong, or leave it out."
+        )
 
 
 def _overlap(first, second) -> bool:

@@ -44,8 +44,16 @@ def configuration_hash(*settings: object) -> str:
     return hashlib.sha256("\n".join(map(repr, settings)).encode()).hexdigest()[:16]
 
 
-def encode(state: eqx.Module, *, configuration: str, step: int, seed: int, history: list[dict]) -> bytes:
-    """The checkpoint of a state."""
+def encode(
+    state: eqx.Module,
+    *,
+    configuration: str,
+    step: int,
+    seed: int,
+    history: list[dict],
+    shape: dict[str, int] | None = None,
+) -> bytes:
+    """The checkpoint of a state; `shape` is what a reader must know to build one like it."""
     buffer = io.BytesIO()
     eqx.tree_serialise_leaves(buffer, state)
     leaves = buffer.getvalue()
@@ -54,6 +62,7 @@ def encode(state: eqx.Module, *, configuration: str, step: int, seed: int, histo
         "configuration": configuration,
         "step": step,
         "seed": seed,
+        "shape": shape or {},
         "history_offset": len(history),
         "history": history,
         "versions": {"jax": jax.__version__, "equinox": eqx.__version__, "numpy": np.__version__},

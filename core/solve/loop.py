@@ -25,6 +25,8 @@ OnEvent = Callable[[dict[str, Any]], object]
 Objective = Callable[[PyTree, PyTree, PRNGKeyArray], tuple[Float[Array, ""], dict[str, Float[Array, ""]]]]
 
 _SMOOTHING = 0.98
+# A step that takes longer is waited for in slices, so that a request to stop is heard meanwhile.
+_LONGEST_WAIT_S = 0.5
 
 
 @setting
@@ -114,10 +116,18 @@ def run(
         )
     keeper = _Keeper(store, settings, configuration)
     began = time.perf_counter()
-    outcome = None
+    outcome, slow = None, False
     while outcome is None:
-        state, parts = step(state, data)
-        number = int(state.step)
+        started = time.perf_counter()
+        following, parts = step(state, data)
+        if slow and should_stop is not None and not _arrived(following.step, should_stop):
+            # What this step began is given up: the state before it is kept within a second.
+            outcome = Outcome.stopped
+            keeper.save_if_due(state, history, final=True)
+            tell({"kind": "checkpoint", "step": int(state.step)})
+            break
+        state, number = following, int(following.step)
+        slow = time.perf_counter() - started > _LONGEST_WAIT_S
         due = number % settings.record_every == 0 or number == settings.steps
         if due or not bool(state.finite):
             history.append(_record(state, parts, time.perf_counter() - began))
@@ -130,6 +140,15 @@ def run(
     run_s = time.perf_counter() - began
     tell({"kind": "end", "step": int(state.step), "outcome": outcome.name, "advice": outcome.value})
     return LoopResult(state.best, state.unknowns, outcome, tuple(history), compile_s, run_s, memory)
+
+
+def _arrived(value: Array, should_stop: Callable[[], bool]) -> bool:
+    """Wait for a step that is being worked out in the background; False where a stop was asked for first."""
+    while not value.is_ready():  # pyright: ignore[reportAttributeAccessIssue]
+        if should_stop():
+            return False
+        time.sleep(0.05)
+    return True
 
 
 def _initial(unknowns: PyTree, optimiser: optax.GradientTransformation) -> LoopState:

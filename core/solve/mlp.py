@@ -27,6 +27,7 @@ from core.solve.frame import frame_of
 from core.solve.loop import LoopSettings, run
 from core.solve.regime import DataModel, Regime, Weights, losses_of
 from core.solve.solution import solution_of
+from core.traced_loss import TracedLoss
 
 OnEvent = Callable[[dict[str, Any]], object]
 
@@ -35,8 +36,9 @@ OnEvent = Callable[[dict[str, Any]], object]
 class MlpSolveSettings:
     """The paper's recipe by default.
 
-    `ray_cells` is the vertex grid on which the network's temperature is taken for the image loss: rays
-    are integrals over it, so every ray of the picture shares one evaluation of the network.
+    `rays`: "network" traces every ray of a mini-batch through the network with `ray_steps` steps, as in
+    the paper; "grid" takes the network's temperature on a vertex grid of `ray_cells`, over which rays are
+    integrals, so that all of them share one evaluation. README has the price of the first.
     """
 
     regime: Regime = "bos+pde+boundary"
@@ -50,6 +52,8 @@ class MlpSolveSettings:
     boundary_points: int = 4096
     weights: Weights = Weights()
     data: DataModel = DataModel()
+    rays: Literal["grid", "network"] = "grid"
+    ray_steps: int = 64
     ray_cells: int = 32
     wall_points: int = 65
     result_vertices: int = 64
@@ -70,7 +74,14 @@ def solve_mlp(
     frame = frame_of(problem)
     n = settings.ray_cells + 1
     losses = losses_of(
-        problem, frame, settings.regime, settings.weights, settings.data, (n, n, n), settings.wall_points
+        problem,
+        frame,
+        settings.regime,
+        settings.weights,
+        settings.data,
+        (n, n, n),
+        settings.wall_points,
+        settings.ray_steps if settings.rays == "network" else None,
     )
     losses = tuple(_with_batches(loss, settings) for loss in losses)
     r = settings.result_vertices
@@ -128,7 +139,7 @@ def _objective(unknowns: Unknowns, losses: tuple[Loss, ...], key: jax.Array):
 
 def _with_batches(loss: Loss, settings: MlpSolveSettings) -> Loss:
     match loss:
-        case ShiftLoss():
+        case ShiftLoss() | TracedLoss():
             return loss.with_batch(settings.pixels)
         case BoundaryLoss():
             return loss.with_batch(settings.boundary_points)

@@ -10,7 +10,7 @@ from core.solve.checkpoint import CheckpointStore
 from core.solve.grid import GridSettings, solve_grid
 from core.solve.loop import LoopSettings
 from core.solve.mlp import MlpSolveSettings, solve_mlp
-from core.solve.regime import Regime
+from core.solve.regime import Regime, Weights
 
 OnEvent = Callable[[dict[str, Any]], object]
 
@@ -20,12 +20,19 @@ def regime_for(problem: Problem) -> Regime:
     return "bos+pde+boundary" if problem.shifts or problem.images else "pde+boundary"
 
 
-def solve_grid_recipe(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+def solve_grid_recipe(
+    problem: Problem,
+    *,
+    on_event: OnEvent | None = None,
+    store: CheckpointStore | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Solution:
     """All losses on the grid; `scene.solve.grid` cells an axis, 32 by default."""
     chosen = problem.scene.solve.grid
     cells = 32 if chosen == "auto" else chosen
-    settings = GridSettings(regime=regime_for(problem), cells=cells, coarsest=min(cells, 32))
-    return solve_grid(problem, settings, on_event=on_event)
+    coarsest = next((n for n in (cells // 4, cells // 2) if n >= 16 and cells % n == 0), cells)
+    settings = GridSettings(regime=regime_for(problem), cells=cells, coarsest=coarsest)
+    return solve_grid(problem, settings, on_event=on_event, store=store, should_stop=should_stop)
 
 
 def solve_paper(
@@ -35,10 +42,15 @@ def solve_paper(
     store: CheckpointStore | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> Solution:
-    """The paper's recipe: AdaBelief, 80,000 iterations, batches of 8192, 5000 and 4096, 64 vertices."""
+    """The paper's recipe: AdaBelief, 80,000 iterations, batches of 8192, 5000 and 4096, 64 vertices.
+
+    Rays go through the network; there are its three losses and no belief about smoothness.
+    """
     settings = MlpSolveSettings(
         regime=regime_for(problem),
         network=MlpSettings(hidden_layers=4, width=128),
         loop=LoopSettings(steps=80_000, patience=80_000),
+        weights=Weights(smoothness=0.0),
+        rays="network",
     )
     return solve_mlp(problem, settings, on_event=on_event, store=store, should_stop=should_stop)

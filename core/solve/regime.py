@@ -17,6 +17,7 @@ from core.scene import Scene
 from core.setting import SettingError, setting
 from core.shift_loss import ShiftLoss, ShiftRows, displacement_rows, similarity_basis
 from core.solve.frame import Frame, height_profile
+from core.traced_loss import TracedLoss, rendered_view, traced_windows
 
 Regime = Literal["bos+boundary", "pde+boundary", "bos+pde+boundary"]
 # Slopes of room air that a smoothness belief allows, as in the `draft` preset.
@@ -65,13 +66,20 @@ def losses_of(
     data: DataModel,
     shape: tuple[int, int, int],
     wall_points: int,
+    traced_steps: int | None = None,
 ) -> tuple[Loss, ...]:
-    """The losses of a regime; temperature for the image loss is taken on a vertex grid of `shape`."""
+    """The losses of a regime; temperature for the image loss is taken on a vertex grid of `shape`.
+
+    With `traced_steps` the rays go through the representation itself, with so many steps each.
+    """
     if regime not in REGIMES:
         raise SettingError(f"There is no regime {regime!r}; expected one of {', '.join(REGIMES)}.")
     losses: list[Loss] = []
     if "bos" in regime:
-        losses.append(image_loss(problem, frame, weights.bos, data, shape))
+        if traced_steps is None:
+            losses.append(image_loss(problem, frame, weights.bos, data, shape))
+        else:
+            losses.append(traced_loss(problem, frame, weights.bos, data, traced_steps))
         if weights.smoothness > 0:
             losses.append(_smoothness(problem, frame, weights.smoothness, shape))
     boundary = boundary_loss(problem, frame, weight=weights.boundary, points_an_axis=wall_points)
@@ -109,8 +117,29 @@ def image_loss(
     return ShiftLoss(tuple(views), frame.vertices(shape), frame.scales, scene.air, weight)
 
 
+def traced_loss(problem: Problem, frame: Frame, weight: float, data: DataModel, steps: int) -> TracedLoss:
+    """The paper's data term of every view: rendered where there are samples, else the windows' shifts."""
+    scene = problem.scene
+    if scene.solve.data_term == "rendered":
+        views = [rendered_view(scene, v, pair) for v, pair in enumerate(problem.images)]
+    else:
+        views = [
+            traced_windows(scene, v, *_kept_windows(problem, v, data)) for v in range(len(problem.shifts))
+        ]
+    return TracedLoss(tuple(views), frame.scales, scene.air, scene.room.lower_m, steps, weight)
+
+
 def _windows(problem: Problem, view: int, data: DataModel, shape: tuple[int, int, int]) -> ShiftRows:
-    shift, camera = problem.shifts[view], problem.scene.views[view].camera
+    kept, model_std_px = _kept_windows(problem, view, data)
+    camera = problem.scene.views[view].camera
+    operator = build(problem.scene, view, kept.centres_px, shape, window_px=float(kept.window_px))
+    basis = similarity_basis(kept.centres_px, (camera.width_px, camera.height_px))
+    return displacement_rows(kept, operator, basis, model_std_px)
+
+
+def _kept_windows(problem: Problem, view: int, data: DataModel) -> tuple[ShiftMeasurement, float]:
+    """Windows that this model can hold, and its representation error in px."""
+    shift = problem.shifts[view]
     used, model_std_px = _usable(shift, data)
     used &= _away_from_walls(problem.scene, view, shift.centres_px, data.margin)
     if not used.any():
@@ -124,9 +153,7 @@ def _windows(problem: Problem, view: int, data: DataModel, shape: tuple[int, int
         shift.information_per_px2[used],
         shift.window_px,
     )
-    operator = build(problem.scene, view, kept.centres_px, shape, window_px=float(kept.window_px))
-    basis = similarity_basis(kept.centres_px, (camera.width_px, camera.height_px))
-    return displacement_rows(kept, operator, basis, model_std_px)
+    return kept, model_std_px
 
 
 def _usable(shift: ShiftMeasurement, data: DataModel) -> tuple[np.ndarray, float]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.geometry import Box, looking_along_y
-from core.problem import Problem, SensorData, ShiftMeasurement
+from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, View, Wall
 from core.setting import SettingError
 from core.solve.check import check_problem
@@ -69,6 +69,37 @@ def test_a_sound_problem_passes():
 def test_bad_problems_are_refused_with_the_reason(wrong, reason):
     with pytest.raises(SettingError, match=reason):
         check_problem(problem(**wrong), "bos+pde+boundary")
+
+
+ROUND = [Wall(wall=w) for w in ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")]  # type: ignore[arg-type]
+
+
+def plane(kelvin):
+    axis_m = np.linspace(0.0, 3.0, 31)
+    shape = (31, 31)
+    return PlaneData("x_min", axis_m, axis_m, np.full(shape, kelvin), np.zeros(shape), np.zeros((*shape, 3)))
+
+
+def test_an_inlet_that_the_measured_plane_contradicts_is_refused():
+    given = problem()
+    check_problem(Problem(given.scene, given.shifts, (plane(301.0),)), "bos+boundary")
+    with pytest.raises(SettingError, match=r"stated at 300 K, and the plane x_min has 295 K"):
+        check_problem(Problem(given.scene, given.shifts, (plane(295.0),)), "bos+boundary")
+
+
+def test_a_plane_given_twice_or_in_celsius_is_refused():
+    given = problem()
+    with pytest.raises(SettingError, match="given 2 times"):
+        check_problem(Problem(given.scene, given.shifts, (plane(300.0), plane(300.0))), "bos+boundary")
+    with pytest.raises(SettingError, match="expected kelvin"):
+        check_problem(Problem(given.scene, given.shifts, (plane(-5.0),)), "bos+boundary")
+
+
+def test_air_that_enters_a_closed_room_is_refused():
+    with pytest.raises(SettingError, match="mass cannot be conserved"):
+        check_problem(problem([INLET, *ROUND]), "pde+boundary")
+    away = Outlet(patch=Patch(wall="x_max", lower_m=(1.0, 2.0), upper_m=(2.0, 2.5)))
+    check_problem(problem([INLET, away, *ROUND]), "pde+boundary")
 
 
 def test_a_problem_without_images_needs_a_regime_without_them():
