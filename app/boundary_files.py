@@ -8,6 +8,7 @@ import numpy as np
 
 from app.errors import BadInputError
 from app.experiment import Experiment
+from core.geometry import Box
 from core.problem import PlaneData, SensorData
 from core.scene import PlaneField, PointSensors, Scene
 
@@ -17,11 +18,13 @@ _SENSOR_COLUMNS = ("x", "y", "z", "T", "T_std", "u", "v", "w", "u_std")
 
 def read_planes(experiment: Experiment, scene: Scene) -> tuple[PlaneData, ...]:
     """Every plane field of the scene. Raises BadInputError."""
-    return tuple(
-        read_plane(experiment.file(known.file), known.wall)
-        for known in scene.boundary
-        if isinstance(known, PlaneField)
-    )
+    planes = []
+    for known in scene.boundary:
+        if isinstance(known, PlaneField):
+            path = experiment.file(known.file)
+            planes.append(read_plane(path, known.wall))
+            _check_in_room(path, planes[-1], scene.room)
+    return tuple(planes)
 
 
 def read_sensors(experiment: Experiment, scene: Scene) -> tuple[SensorData, ...]:
@@ -51,8 +54,13 @@ def read_plane(path: Path, wall: str) -> PlaneData:
             raise BadInputError(
                 f"{path}: {name} has shape {arrays[name].shape}; expected finite values of shape {expected}."
             )
-    if arrays["T"].min() <= 0:
-        raise BadInputError(f"{path}: T reaches {arrays['T'].min():g}; expected kelvin, above 0.")
+    for name in (first, second):
+        axis = arrays[name]
+        if axis.ndim != 1 or len(axis) < 2 or not np.isfinite(axis).all() or np.any(np.diff(axis) <= 0):
+            raise BadInputError(
+                f"{path}: the coordinates {name} do not increase; expected at least two increasing values in metres."
+            )
+    _check_kelvin(path, arrays["T"])
     return PlaneData(wall, arrays[first], arrays[second], arrays["T"], arrays["p"], arrays["u"])
 
 
@@ -81,8 +89,13 @@ def read_sensor_table(path: Path, scene: Scene) -> SensorData:
             f"{path}: the sensor in row {int(outside.argmax()) + 2} at {position[outside][0]} m is outside the "
             f"room {room.lower_m} to {room.upper_m} m. Were millimetres given for metres?"
         )
-    if np.nanmin(table["T"], initial=1e3) < 150:
-        raise BadInputError(f"{path}: T reaches {np.nanmin(table['T']):g}; give kelvin (20 C is 293.15).")
+    _check_kelvin(path, table["T"])
+    for name in ("T_std", "u_std"):
+        if not np.nanmin(table[name], initial=1.0) > 0:
+            raise BadInputError(
+                f"{path}: {name} reaches {np.nanmin(table[name]):g}; give the standard deviation of each reading, "
+                "above 0, or leave the column out."
+            )
     return SensorData(
         position_m=position,
         temperature_k=table["T"],
@@ -90,6 +103,28 @@ def read_sensor_table(path: Path, scene: Scene) -> SensorData:
         velocity_m_s=np.stack([table[axis] for axis in "uvw"], axis=-1),
         velocity_std_m_s=np.where(np.isnan(table["u_std"]), 0.05, table["u_std"]),
     )
+
+
+def _check_kelvin(path: Path, temperature_k: np.ndarray) -> None:
+    """NaN is no reading; every other one is a temperature of air."""
+    low, high = np.nanmin(temperature_k, initial=300.0), np.nanmax(temperature_k, initial=300.0)
+    if low < 150 or high > 5000:
+        wrong = low if low < 150 else high
+        raise BadInputError(
+            f"{path}: T reaches {wrong:g}; give kelvin, 150 to 5000 (20 degrees Celsius is 293.15)."
+        )
+
+
+def _check_in_room(path: Path, plane: PlaneData, room: Box) -> None:
+    """A plane reaches a tenth of the room beyond its wall at most: more is another unit or another room."""
+    axes = [a for a in range(3) if a != "xyz".index(plane.wall[0])]
+    for axis, line in zip(axes, (plane.first_m, plane.second_m), strict=True):
+        slack_m = 0.1 * room.size_m[axis]
+        if line[0] < room.lower_m[axis] - slack_m or line[-1] > room.upper_m[axis] + slack_m:
+            raise BadInputError(
+                f"{path}: the plane spans {line[0]:g} to {line[-1]:g} m along {'xyz'[axis]}; the room spans "
+                f"{room.lower_m[axis]:g} to {room.upper_m[axis]:g} m. Were millimetres given for metres?"
+            )
 
 
 def _number(text: str | None, path: Path, name: str) -> float:

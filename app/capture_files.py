@@ -56,7 +56,15 @@ def read_image(path: Path) -> BurstImage:
             mean, std = (page.asarray() for page in file.pages)
             about: dict[str, Any] = json.loads(file.pages.first.description)
         return BurstImage(mean, std, int(about["frames"]))
-    except (OSError, ValueError, KeyError, tifffile.TiffFileError) as error:
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        IndexError,
+        struct.error,
+        tifffile.TiffFileError,
+    ) as error:
         raise BadInputError(
             f"{path} is not a capture's image ({error}); expected a TIFF of two pages, mean and standard "
             "deviation. Take the capture again, or restore the file from a copy."

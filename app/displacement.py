@@ -20,6 +20,7 @@ from core.problem import ShiftMeasurement
 Image = Float32[np.ndarray, "rows cols"]
 
 _BORDER = 0.08
+_LEAST_TEXTURE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -82,8 +83,9 @@ def _standard_deviation(a: Image, b: Image, field: np.ndarray, window_px: int) -
     residual = local_mean((undone - a) ** 2)
     # Effective number of pixels under a Gaussian of sigma window / 4.
     members = 4 * np.pi * (window_px / 4) ** 2
-    # Noise of a hundredth of a grey level at least: a flat window knows nothing.
-    determinant = np.maximum(xx * yy - xy**2, 1e-6)
+    # Noise of a hundredth of a grey level at least; a flat window knows nothing, some tens of pixels.
+    xx, yy = xx + _LEAST_TEXTURE, yy + _LEAST_TEXTURE
+    determinant = np.maximum(xx * yy - xy**2, _LEAST_TEXTURE * (xx + yy) / 2)
     variance = np.stack([yy, xx], -1) * ((residual + 1e-4) / determinant / members)[..., None]
     return np.sqrt(variance).astype(np.float32)
 

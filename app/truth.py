@@ -58,7 +58,8 @@ def read_volume(path: Path) -> RoomVolume:
                 f"{path}: the coordinates {name} do not increase, so the box has no volume; "
                 "expected at least two increasing values in metres."
             )
-    _check_temperature(path, arrays["T"])
+    _check_temperature(path, "T", arrays["T"])
+    _check_temperature(path, "T0", arrays["T0"])
     case = _case(path, arrays)
     scalars = {k: v.item() for k, v in arrays.items() if v.ndim == 0 and v.dtype.kind in "fiu"}
     return RoomVolume(
@@ -95,12 +96,12 @@ def _read_npz(path: Path) -> dict[str, np.ndarray]:
         ) from None
 
 
-def _check_temperature(path: Path, temperature_k: np.ndarray) -> None:
+def _check_temperature(path: Path, name: str, temperature_k: np.ndarray) -> None:
     lowest, highest = float(temperature_k.min()), float(temperature_k.max())
-    if lowest <= 0 or highest > 5000:
-        hint = " Were degrees Celsius given for kelvin?" if -80 < lowest <= 0 else ""
+    if not (lowest >= 150 and highest <= 5000):
+        hint = " Were degrees Celsius given for kelvin?" if -80 < lowest < 150 else ""
         raise BadInputError(
-            f"{path}: T runs from {lowest:g} to {highest:g}; expected kelvin, above 0 and below 5000.{hint}"
+            f"{path}: {name} runs from {lowest:g} to {highest:g}; expected kelvin, 150 to 5000.{hint}"
         )
 
 

@@ -91,7 +91,7 @@ def measure_projector(
     """Luminance (0..1 of white, black level included) by grey level, and the best exponent.
 
     Raises:
-        ImageError: fewer than four levels, or a ramp whose order is wrong.
+        ImageError: fewer than four levels, a ramp whose order is wrong, or one that does not rise.
     """
     if len(levels) != len(ramp) or len(levels) < 4:
         raise ImageError(
@@ -104,6 +104,11 @@ def measure_projector(
         raise ImageError(
             "The grey ramp does not grow with its level; expected darker to brighter. Check the order of "
             "the frames, and that the projector's dynamic contrast and iris are off."
+        )
+    if light[-1] - light[0] < 0.01 * light[-1]:
+        raise ImageError(
+            f"The grey ramp goes from {light[0]:.0f} to {light[-1]:.0f} counts above dark; expected it to rise. "
+            "Every level is saturated, or the projector's light does not reach the camera: shorten the exposure."
         )
     relative = light / light[-1]
     black = float(relative[0]) if grey[0] <= 0 else 0.0

@@ -9,7 +9,7 @@ eta by 9.3e-7, eight steps.
 import numpy as np
 from jaxtyping import Array, Float
 
-from core.setting import SettingError, setting
+from core.setting import check_range, setting
 
 GAS_CONSTANT_DRY_AIR_J_KG_K = 287.05
 GRAVITY_M_S2 = 9.81
@@ -48,21 +48,28 @@ class Air:
     prandtl: float = 0.71
 
     def __post_init__(self) -> None:
-        if not 1e3 <= self.pressure_pa <= 1e6:
-            raise SettingError(
-                f"Air pressure is {self.pressure_pa:g} Pa; expected 1e3 to 1e6 Pa. "
-                "Give pressure_pa in pascal (1013.25 hPa is 101325 Pa)."
-            )
-        if not 150.0 <= self.ambient_temperature_k <= 2500.0:
-            raise SettingError(
-                f"Ambient temperature is {self.ambient_temperature_k:g} K; expected 150 to 2500 K. "
-                "Give ambient_temperature_k in kelvin (20 degrees Celsius is 293.15 K)."
-            )
-        if not 200e-9 <= self.wavelength_m <= 2e-6:
-            raise SettingError(
-                f"Wavelength is {self.wavelength_m:g} m; expected 200e-9 to 2e-6 m. "
-                "Give wavelength_m in metres (600 nm is 600e-9 m)."
-            )
+        check_range(
+            "Air pressure", self.pressure_pa, 1e4, 1e6, "Pa",
+            "Give pressure_pa in pascal (1013.25 hPa is 101325 Pa).",
+        )  # fmt: skip
+        check_range(
+            "Ambient temperature", self.ambient_temperature_k, 150.0, 2500.0, "K",
+            "Give ambient_temperature_k in kelvin (20 degrees Celsius is 293.15 K).",
+        )  # fmt: skip
+        check_range(
+            "Wavelength", self.wavelength_m, 200e-9, 2e-6, "m",
+            "Give wavelength_m in metres (600 nm is 600e-9 m).",
+        )  # fmt: skip
+        if self.gladstone_dale is not None:
+            check_range(
+                "The Gladstone-Dale coefficient", self.gladstone_dale, 1e-5, 1e-2, "m3/kg",
+                "Give gladstone_dale in m3/kg (dry air has 2.26e-4).",
+            )  # fmt: skip
+        check_range(
+            "Kinematic viscosity", self.kinematic_viscosity_m2_s, 1e-7, 1e-2, "m2/s",
+            "Give kinematic_viscosity_m2_s in m2/s (air at 20 C has 1.5e-5; 15 mm2/s is 1.5e-5).",
+        )  # fmt: skip
+        check_range("The Prandtl number", self.prandtl, 1e-3, 1e4, "", "Air has 0.71.")
 
     @property
     def density_kg_m3(self) -> float:

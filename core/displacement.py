@@ -20,7 +20,7 @@ from jaxtyping import Float
 from scipy import ndimage
 
 from core.problem import ShiftMeasurement
-from core.setting import SettingError, setting
+from core.setting import SettingError, check_range, setting
 
 Image = Float[np.ndarray, "rows cols"]
 AnyImage = Float[np.ndarray, "_ _"]
@@ -47,9 +47,14 @@ def measure_shift(
     """Displacement of every whole window of `window_px`, from the image edge on.
 
     `difference_variance` is the variance of one pixel of `flow_image - reference_image`, in the images'
-    unit squared. Raises SettingError for unequal sizes or an image smaller than one window.
+    unit squared. Raises SettingError for unequal sizes, an image smaller than one window, or no noise.
     """
     check_pair(reference_image, flow_image, window_px)
+    if not (np.isfinite(difference_variance).all() and np.min(difference_variance) > 0):
+        raise SettingError(
+            f"The images' noise has a variance down to {np.min(difference_variance):g}; expected finite values "
+            "above 0. State full_well_e, read_noise_e and bits of the camera."
+        )
     taps = derivative_filter()
     mean = 0.5 * (reference_image + flow_image)
     basis = (
@@ -72,6 +77,7 @@ def measure_shift(
 
 def check_pair(reference_image: np.ndarray, flow_image: np.ndarray, window_px: int) -> None:
     """Refuse a pair that cannot be compared (SettingError)."""
+    check_range("window_px", window_px, 2, 4096, "px", "32 px serve a camera of 4096 px.")
     if reference_image.shape != flow_image.shape:
         raise SettingError(
             f"The reference is {_size(reference_image)} and the flow image {_size(flow_image)}; expected "

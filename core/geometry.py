@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from core.setting import SettingError, setting
+from core.setting import SettingError, check_range, setting
 
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
@@ -30,10 +30,14 @@ class Box:
                     f"The room box has no extent along {axis}: {lower:g} to {upper:g} m. "
                     "Give lower_m below upper_m on every axis, in metres."
                 )
-        if max(self.size_m) > 2000.0:
-            raise SettingError(
-                f"The room box is {max(self.size_m):g} m long; expected at most 2000 m. "
-                "Were millimetres given for metres?"
+        for axis, size in zip("xyz", self.size_m, strict=True):
+            check_range(
+                f"The room's extent along {axis}",
+                size,
+                1e-3,
+                500.0,
+                "m",
+                "Were millimetres given for metres?",
             )
 
     @property
@@ -76,10 +80,19 @@ class Optics:
                 f"Optics of {self.width_px} x {self.height_px} px; expected at least 1 x 1 px. "
                 "Give width_px and height_px of the sensor or panel."
             )
-        if min(self.focal_px) <= 0:
+        # A pinhole's picture beyond 170 degrees is no picture; 25 mm given for 5000 px has 178.
+        least_px = 0.044 * max(self.width_px, self.height_px)
+        for focal_px in self.focal_px:
+            check_range(
+                "Focal length", focal_px, least_px, 1e9, "px",
+                "A focal length in px is f / pixel pitch (25 mm over 5 um is 5000 px). Were millimetres given?",
+            )  # fmt: skip
+        numbers = (*self.principal_px, *self.position_m, *self.rotation_rad, *self.distortion)
+        if not np.isfinite(numbers).all():
             raise SettingError(
-                f"Focal length is {self.focal_px} px; expected positive values. "
-                "A focal length in px is f / pixel pitch (25 mm over 5 um is 5000 px)."
+                f"Optics hold numbers that are not finite: principal_px {self.principal_px}, position_m "
+                f"{self.position_m}, rotation_rad {self.rotation_rad}, distortion {self.distortion}. "
+                "Give finite numbers; calibrate again if they came from a calibration."
             )
 
     @property

@@ -9,7 +9,7 @@ from typing import Literal
 
 from core.air import Air
 from core.geometry import Box, Optics, Vector2, Vector3, WallName
-from core.setting import SettingError, setting
+from core.setting import SettingError, check_kelvin, check_range, setting
 
 Auto = Literal["auto"]
 
@@ -29,6 +29,12 @@ class CameraNoise:
                 f"Camera noise has full_well_e {self.full_well_e:g}, read_noise_e {self.read_noise_e:g}, "
                 f"bits {self.bits}; expected full_well_e > 0, read_noise_e >= 0, bits 1 to 16."
             )
+        check_range("full_well_e", self.full_well_e, 1.0, 1e9, "electrons", "Take it from photon transfer.")
+        check_range("read_noise_e", self.read_noise_e, 0.0, 1e6, "electrons", "Take it from dark frames.")
+        check_range(
+            "dark_counts", self.dark_counts, 0.0, 0.9 * (2**self.bits - 1), "counts",
+            f"A dark frame of {self.bits} bits lies far below {2**self.bits - 1} counts: check both.",
+        )  # fmt: skip
 
 
 @setting
@@ -41,6 +47,15 @@ class View:
     frames: int = 100
     f_number: float | None = None
     focal_m: float | None = None
+
+    def __post_init__(self) -> None:
+        check_range("frames", self.frames, 1, 1_000_000, "", "One image is the mean of at least one frame.")
+        if self.f_number is not None:
+            check_range(
+                "f_number", self.f_number, 0.1, 1000.0, "", "It is the number on the lens (f/8 is 8)."
+            )
+        if self.focal_m is not None:
+            check_range("focal_m", self.focal_m, 1e-4, 10.0, "m", "Give metres (25 mm is 0.025 m).")
 
 
 @setting
@@ -83,6 +98,12 @@ class FixedTexture:
     pattern: Pattern = WaveletPattern()
     pixel_m: float = 0.001
 
+    def __post_init__(self) -> None:
+        check_range(
+            "pixel_m, the size of a printed pattern pixel,", self.pixel_m, 1e-6, 0.5, "m",
+            "Give metres (1 mm is 0.001 m).",
+        )  # fmt: skip
+
 
 @setting
 class ProjectedPattern:
@@ -113,6 +134,13 @@ class Patch:
     lower_m: Vector2
     upper_m: Vector2
 
+    def __post_init__(self) -> None:
+        if not all(low < high for low, high in zip(self.lower_m, self.upper_m, strict=True)):
+            raise SettingError(
+                f"The patch on {self.wall} has no area: {self.lower_m} to {self.upper_m} m. "
+                "Give lower_m below upper_m along both axes of the wall, in metres."
+            )
+
 
 @setting
 class Inlet:
@@ -131,6 +159,22 @@ class Inlet:
     turbulence_intensity: float = 0.1
     length_scale_m: float | None = None
 
+    def __post_init__(self) -> None:
+        check_kelvin("The inlet's temperature", self.temperature_k)
+        _check_std("The inlet's temperature_std_k", self.temperature_std_k, "K")
+        _check_std("The inlet's velocity_std_m_s", self.velocity_std_m_s, "m/s")
+        for speed_m_s in self.velocity_m_s:
+            check_range(
+                "A component of the inlet's velocity", speed_m_s, -100.0, 100.0, "m/s",
+                "Give metres a second (500 mm/s is 0.5 m/s); air near the speed of sound is not modelled.",
+            )  # fmt: skip
+        check_range(
+            "turbulence_intensity", self.turbulence_intensity, 0.0, 1.0, "",
+            "It is a share of the speed (10 % is 0.1).",
+        )  # fmt: skip
+        if self.length_scale_m is not None:
+            check_range("length_scale_m", self.length_scale_m, 1e-6, 100.0, "m", "Give metres.")
+
 
 @setting
 class Outlet:
@@ -140,6 +184,11 @@ class Outlet:
     patch: Patch
     mean_temperature_k: float | None = None
     temperature_std_k: float = 0.1
+
+    def __post_init__(self) -> None:
+        if self.mean_temperature_k is not None:
+            check_kelvin("The outlet's mean temperature", self.mean_temperature_k)
+        _check_std("The outlet's temperature_std_k", self.temperature_std_k, "K")
 
 
 @setting
@@ -159,6 +208,9 @@ class Wall:
                 f"Wall {self.wall} has thermal = {self.thermal!r} and temperature_k = {self.temperature_k}; "
                 "give temperature_k with thermal = 'temperature', and only then."
             )
+        if self.temperature_k is not None:
+            check_kelvin(f"The temperature of wall {self.wall}", self.temperature_k)
+        _check_std(f"temperature_std_k of wall {self.wall}", self.temperature_std_k, "K")
 
 
 @setting
@@ -169,6 +221,10 @@ class Heater:
     patch: Patch
     temperature_k: float
     temperature_std_k: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_kelvin("The heater's temperature", self.temperature_k)
+        _check_std("The heater's temperature_std_k", self.temperature_std_k, "K")
 
 
 @setting
@@ -190,6 +246,13 @@ class FlowModel:
     viscosity_m2_s: float | None = None
     diffusivity_m2_s: float | None = None
 
+    def __post_init__(self) -> None:
+        for name in ("viscosity_m2_s", "diffusivity_m2_s"):
+            value = getattr(self, name)
+            advice = "Air has 1.5e-5 m2/s; with a room's turbulence about 1e-3."
+            if value is not None:
+                check_range(name, value, 1e-9, 1e3, "m2/s", advice)
+
 
 @setting
 class RayModel:
@@ -202,6 +265,12 @@ class RayModel:
     samples_per_pixel: int | Auto = "auto"
     aperture_cone: bool | Auto = "auto"
 
+    def __post_init__(self) -> None:
+        if self.steps != "auto":
+            check_range("steps", self.steps, 1, 16_384, "", "64 serve a room; take 'auto' when in doubt.")
+        if self.samples_per_pixel != "auto":
+            check_range("samples_per_pixel", self.samples_per_pixel, 1, 1024, "", "Nine serve most scenes.")
+
 
 @setting
 class SolveModel:
@@ -210,6 +279,12 @@ class SolveModel:
     data_term: Literal["auto", "rendered", "warped", "displacement"] = "auto"
     grid: int | Auto = "auto"
     window_px: int | Auto = "auto"
+
+    def __post_init__(self) -> None:
+        if self.grid != "auto":
+            check_range("grid", self.grid, 2, 1024, "cells", "32 to 64 cells an axis serve a room.")
+        if self.window_px != "auto":
+            check_range("window_px", self.window_px, 2, 4096, "px", "32 px serve a camera of 4096 px.")
 
 
 @setting
@@ -229,9 +304,23 @@ class Scene:
         if not self.views:
             raise SettingError("The scene has no view; give at least one camera under [[scene.views]].")
         for view in self.views:
-            x, y, z = view.camera.position_m
-            if y >= self.room.upper_m[1]:
-                raise SettingError(
-                    f"Camera {view.name!r} at ({x:g}, {y:g}, {z:g}) m is in or behind the back wall "
-                    f"y = {self.room.upper_m[1]:g} m; place it in front of the wall (smaller y)."
-                )
+            _check_place(f"Camera {view.name!r}", view.camera.position_m, self.room)
+        if isinstance(self.light, ProjectedPattern):
+            _check_place("The projector", self.light.projector.position_m, self.room)
+
+
+def _check_std(what: str, value: float, unit: str) -> None:
+    check_range(what, value, 1e-9, 1e6, unit, "It is one standard deviation: nothing is known exactly.")
+
+
+def _check_place(what: str, position_m: Vector3, room: Box) -> None:
+    """In front of the back wall; farther than 2 km from the room a position is in other units."""
+    x, y, z = position_m
+    if y >= room.upper_m[1]:
+        raise SettingError(
+            f"{what} at ({x:g}, {y:g}, {z:g}) m is in or behind the back wall "
+            f"y = {room.upper_m[1]:g} m; place it in front of the wall (smaller y)."
+        )
+    reach_m = sum((p - c) ** 2 for p, c in zip(position_m, room.centre_m, strict=True)) ** 0.5
+    advice = "Were millimetres given for metres?"
+    check_range(f"{what}'s distance from the room", reach_m, 0.0, 2000.0, "m", advice)

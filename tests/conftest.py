@@ -2,6 +2,10 @@
 
 import jax
 
+from tests.extremes.summary import pytest_runtest_logreport, pytest_terminal_summary
+
+__all__ = ["pytest_runtest_logreport", "pytest_terminal_summary"]
+
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 
@@ -9,3 +13,4 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 def pytest_addoption(parser):
     parser.addoption("--camera", help="a V4L2 device for the hardware half of the camera contract")
     parser.addoption("--projector", help="URL of a projector for the hardware half of its contract")
+    parser.addoption("--extremes-table", help="write every row of tests/extremes to this file (Markdown)")

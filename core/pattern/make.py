@@ -7,7 +7,11 @@ from core.pattern.checkerboard import checkerboard
 from core.pattern.dots import random_dots
 from core.pattern.wavelet import wavelet_noise
 from core.scene import DotPattern, Pattern, WaveletPattern
-from core.setting import SettingError
+from core.setting import SettingError, check_range
+
+# Four times the largest panel; as float64 it fills 2 GB.
+_MOST_PIXELS = 2.0**28
+_TOO_FINE = "A pattern pixel cannot show less, nor a wall much more."
 
 
 def make_pattern(pattern: Pattern, rows: int, cols: int) -> Float32[np.ndarray, "rows cols"]:
@@ -16,24 +20,22 @@ def make_pattern(pattern: Pattern, rows: int, cols: int) -> Float32[np.ndarray, 
     Wavelet noise has mean 1/2 and rms `contrast` before it is clipped. Raises SettingError for a size or
     a feature below one pixel.
     """
-    if rows < 2 or cols < 2:
-        raise SettingError(f"A pattern of {cols} x {rows} px was asked for; expected at least 2 x 2 px.")
+    if rows < 2 or cols < 2 or rows * cols > _MOST_PIXELS:
+        raise SettingError(
+            f"A pattern of {cols} x {rows} px was asked for; expected at least 2 x 2 px and at most "
+            f"{_MOST_PIXELS:g} in all. Check pixel_m (a print) or the projector's panel."
+        )
     match pattern:
         case WaveletPattern():
-            _check("finest_px", pattern.finest_px, 2.0)
+            check_range("finest_px", pattern.finest_px, 2.0, 1e4, "pattern pixels", _TOO_FINE)
+            check_range("bands", pattern.bands, 1, 12, "", "Four octaves serve most cameras.")
+            check_range("contrast", pattern.contrast, 0.0, 10.0, "", "It is the rms about 1/2: 0.2 is usual.")
             luminance = 0.5 + pattern.contrast * wavelet_noise(pattern, rows, cols)
         case DotPattern():
-            _check("diameter_px", pattern.diameter_px, 1.0)
+            check_range("diameter_px", pattern.diameter_px, 1.0, 1e3, "pattern pixels", _TOO_FINE)
+            check_range("coverage", pattern.coverage, 0.0, 0.99, "", "It is the inked share of the wall.")
             luminance = 1.0 - random_dots(pattern, rows, cols)
         case _:
-            _check("square_px", pattern.square_px, 1.0)
+            check_range("square_px", pattern.square_px, 1.0, 1e6, "pattern pixels", _TOO_FINE)
             luminance = checkerboard(pattern, rows, cols)
     return np.clip(luminance, 0.0, 1.0).astype(np.float32)
-
-
-def _check(name: str, value_px: float, least_px: float) -> None:
-    if value_px < least_px:
-        raise SettingError(
-            f"Pattern has {name} = {value_px:g}; a pattern pixel cannot show less than {least_px:g}. "
-            f"Raise {name}."
-        )

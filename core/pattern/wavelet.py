@@ -18,6 +18,7 @@ _DOWN_HALF = [
     0.655340, 0.033979, -0.243780, -0.025936, 0.103311, 0.011655, -0.044412, -0.005040,
     0.019120, 0.002172, -0.008233, -0.000938, 0.003546, 0.000410, -0.001528, 0.000334,
 ]  # fmt: skip
+_LEAST_STD = 1e-9
 _UP = np.array([0.25, 0.75, 0.75, 0.25])
 
 
@@ -28,8 +29,9 @@ def wavelet_noise(pattern: WaveletPattern, rows: int, cols: int) -> Float[np.nda
         # The band ends at half a cycle a spacing, so its finest period is two spacings.
         spacing_px = pattern.finest_px / 2 * 2**band
         noise = _band(np.random.default_rng([pattern.seed, band]), rows, cols, spacing_px)
-        total += noise / noise.std()
-    return (total - total.mean()) / total.std()
+        # A band coarser than the whole pattern is nearly constant there, and adds nothing.
+        total += noise / max(float(noise.std()), _LEAST_STD)
+    return (total - total.mean()) / max(float(total.std()), _LEAST_STD)
 
 
 def _band(

@@ -41,7 +41,7 @@ def change(name, value):
         (change("T", lambda a: a["T"][:-1]), "T has shape"),
         (change("T", lambda a: np.where(a["T"] > 302, np.nan, a["T"])), "not finite"),
         (change("T", lambda a: a["T"] - 273.15 - 30), "degrees Celsius"),
-        (change("T", lambda a: a["T"] * 0 - 300), "above 0"),
+        (change("T", lambda a: a["T"] * 0 - 300), "expected kelvin"),
         (change("x", lambda a: a["x"] * 0), "no volume"),
         (change("meta_json", lambda a: np.array("{")), "not JSON"),
     ],
