@@ -5,7 +5,7 @@
 D holds the fields' derivatives in the fitted parameters and C their posterior covariance. The second term
 is what a grid and a closure cannot represent: two grids differ by about what the finer one still lacks,
 two closures by about what either does. a, b and c were set once so that 95 % intervals hold on rooms of
-several closures; s is the field's own scale.
+several closures; s is the field's own scale times the share of the images that is left unexplained.
 """
 
 import equinox as eqx
@@ -15,8 +15,8 @@ from scipy import ndimage
 
 Field = Float[np.ndarray, "vx vy vz ..."]
 
-# Shares of the differences of grids and of closures, and floor as a share of the field's own scale.
-_GRID_SHARE, _CLOSURE_SHARE, _FLOOR_SHARE = 0.7, 0.0, 0.06
+# Shares of the differences of grids and of closures, and of s.
+_GRID_SHARE, _CLOSURE_SHARE, _FLOOR_SHARE = 0.7, 0.4, 0.4
 _SMOOTH_VERTICES = 2.5
 
 
@@ -36,7 +36,7 @@ def deviation(
 ) -> Deviation:
     """Combine the three terms; parameters are in units of their prior deviations.
 
-    `differences` are those of two grids and of two closures; `scale` is the field's own scale; `extra` are
+    `differences` are those of two grids and of two closures; `scale` is s; `extra` are
     a correction's variances before and after the data.
     """
     roots = np.linalg.cholesky(covariance) if len(derivatives) else np.zeros((0, 0))

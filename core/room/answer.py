@@ -18,7 +18,8 @@ from core.uncertainty import Deviation, deviation
 
 # Prior size of the temperature's last correction, as a share of the departure from the profile.
 CORRECTION_SHARE = 0.3
-PRESSURE_SCALE = 1.6
+# Taken for the share of the images that is left unexplained where there are none.
+_UNSEEN_SHARE = 0.3
 
 
 class Solved(eqx.Module):
@@ -40,21 +41,17 @@ def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
     best, box, problem = solved.best, solved.problem.scene.room, solved.problem
     values, _, _ = solved.data.values()
     residual = values - solved.data.predicted(best.seen)
-    # Pressure follows the level of T, which no departure shows.
-    scales = [
-        departure(best.seen.excess_k),
-        PRESSURE_SCALE * rms(best.seen.pressure_m2_s2),
-        rms(best.seen.velocity_m_s),
-    ]
+    local_k = departure(best.seen.excess_k)
     change = temperature_correction(
-        solved.data, best.seen.excess_k, residual, CORRECTION_SHARE * scales[0], scales[0]
+        solved.data, best.seen.excess_k, residual, CORRECTION_SHARE * local_k, local_k
     )
     free = free_vertices(solved.layout, best.seen.excess_k.shape)
     excess = best.seen.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     variances = (change.prior_variance_k2[:, None, :] * free, change.variance_k2[:, None, :] * free)
-    temperature = _deviation(solved, "excess_k", scales[0], variances)
-    pressure = _deviation(solved, "pressure_m2_s2", scales[1], (0.0, 0.0))
-    velocity = _deviation(solved, "velocity_m_s", scales[2], (0.0, 0.0))
+    share = unexplained(solved.data, residual, values)
+    temperature = _deviation(solved, "excess_k", share * local_k, variances)
+    pressure = _deviation(solved, "pressure_m2_s2", share * departure(best.seen.pressure_m2_s2), (0.0, 0.0))
+    velocity = _deviation(solved, "velocity_m_s", share * rms(best.seen.velocity_m_s), (0.0, 0.0))
     x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(excess.shape))
     return Solution(
         x,
@@ -83,9 +80,19 @@ def sentences(
         *solved.layout.notes,
         *undetermined(solved.problem),
         *contradictions(solved.problem, solved.prior, solved.posterior),
-        *misfit(solved.data, residual, values),
+        *misfit(solved.data, unexplained(solved.data, residual, values)),
         *balances(parameters, inflow, solved.best.seen.outflow_excess_k, solved.problem),
     ]
+
+
+def unexplained(
+    data: Observations, residual: Float[np.ndarray, " data"], values: Float[np.ndarray, " data"]
+) -> float:
+    """Share (rms) of the measured shifts that the room does not explain."""
+    shifts = data.values()[2] == 0
+    if not shifts.any():
+        return _UNSEEN_SHARE
+    return float(np.linalg.norm(residual[shifts]) / max(float(np.linalg.norm(values[shifts])), 1e-30))
 
 
 def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.ndarray, "vx vy vz"]:

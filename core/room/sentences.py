@@ -1,7 +1,6 @@
 """What a fit says to the operator: balances, entries that the images contradict, and what to distrust."""
 
 import numpy as np
-from jaxtyping import Float
 
 from core.problem import Problem
 from core.room.fit import Posterior
@@ -55,14 +54,10 @@ def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list
     return said
 
 
-def misfit(
-    data: Observations, residual: Float[np.ndarray, " data"], values: Float[np.ndarray, " data"]
-) -> list[str]:
+def misfit(data: Observations, share: float) -> list[str]:
     """A sentence on how much of the measured shifts the room explains, with a warning when it is little."""
-    shifts = data.values()[2] == 0
-    if not shifts.any():
+    if not data.shifts:
         return []
-    share = float(np.linalg.norm(residual[shifts]) / max(float(np.linalg.norm(values[shifts])), 1e-30))
     said = [f"{100 * share:.0f} % (rms) of the measured shifts is left unexplained by the fitted room."]
     if share > _POOR_FIT:
         said.append(

@@ -33,8 +33,9 @@ from core.scene import Scene
 
 Vector = Float[np.ndarray, " active"]
 
-# A correction that leaves more than this of the misfit did harm: the room before it is kept.
-_HARM = 1.05
+# A correction that leaves more than this of the misfit did harm: the room before it is kept. Below it, the
+# room may only not have settled yet.
+_HARM = 1.5
 
 
 def solve_room(

@@ -1,6 +1,7 @@
 import numpy as np
 
 from app.benches.placement import share_left
+from app.room_scene import RIG_PLACES
 from core.geometry import Box
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(3.0, 3.0, 3.0))
@@ -16,3 +17,14 @@ def test_a_horizontal_baseline_is_blind_to_stratification_and_nothing_is_left_at
     assert none < 1e-4
     assert across < 0.15
     assert up > 0.2
+
+
+def test_the_lab_rig_keeps_the_signal_where_the_papers_place_is_nearly_blind():
+    x, height = np.linspace(-1.0, 1.0, 24)[:, None, None], np.linspace(0.0, 1.0, 24)
+    layers = 5.0 * height**2
+    plume = 5.0 * np.exp(-((x / 0.3) ** 2)) * np.ones((24, 24, 24))
+
+    for excess_k in (np.broadcast_to(layers, (24, 24, 24)).copy(), plume):
+        paper, lab = (share_left(ROOM, excess_k, *RIG_PLACES[name]) for name in ("paper", "lab"))
+        assert lab > 0.3
+        assert lab > 3 * paper
