@@ -17,6 +17,7 @@ from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.rays.operator import StraightRayOperator, build
 from core.rays.optics import pinhole
 from core.room.grid import AXES, WALLS
+from core.room.plane_openings import still_vertices
 from core.room.vertices import linear_matrix
 from core.scene import Outlet, Scene
 
@@ -201,8 +202,7 @@ def _plane_pool(
     plane: PlaneData, values: Float[np.ndarray, "rows cols"], scene: Scene
 ) -> Float[np.ndarray, " blocks"]:
     """Means over 6 x 12 blocks of the plane, openings left out: a profile with a little breadth."""
-    still = np.abs(plane.velocity_m_s).max(axis=2) < 0.02 * max(float(np.abs(plane.velocity_m_s).max()), 1e-9)
-    still[[0, -1]] = still[:, [0, -1]] = False
+    still = still_vertices(plane)
     rows, cols = (
         np.minimum((np.arange(n) * m) // n, m - 1) for n, m in zip(values.shape, (6, 12), strict=True)
     )

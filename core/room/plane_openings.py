@@ -6,7 +6,7 @@ flow of their kind, its edges where the flow falls to half; the volume flow thro
 """
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -15,10 +15,13 @@ from scipy import ndimage
 from core.geometry import Vector2
 from core.problem import PlaneData, Problem
 from core.room.grid import WALLS
+from core.room.openings import stated_walls
 from core.scene import Heater, Inlet, Outlet, Patch
 
 # Patches slower than this share of the fastest flow through the plane are not told from rounding.
 _SLOWEST = 0.05
+# Air slower than this share of the fastest in the plane is a wall's.
+_STILL = 0.02
 
 
 def with_plane_openings(problem: Problem) -> Problem:
@@ -26,6 +29,8 @@ def with_plane_openings(problem: Problem) -> Problem:
     if any(isinstance(b, Inlet | Outlet | Heater) for b in problem.scene.boundary):
         return problem
     found = tuple(opening for plane in problem.planes for opening in plane_openings(plane))
+    if any(_share_area(one.patch, other.patch) for one, other in combinations(found, 2)):
+        return problem
     kinds = {type(opening) for opening in found}
     if kinds != {Inlet, Outlet}:
         return problem
@@ -47,6 +52,30 @@ def plane_openings(plane: PlaneData) -> list[Inlet | Outlet]:
             if fastest > 0 and min(np.ptp(np.nonzero(own)[0]), np.ptp(np.nonzero(own)[1])) > 0:
                 found.append(_opening(plane, own, supplies=sign > 0))
     return found
+
+
+def air_planes(problem: Problem) -> list[PlaneData]:
+    """Planes of side walls that have the temperature of the air beside them: not those held at their own."""
+    walls = stated_walls(problem.scene)
+    held = {name for name, wall in walls.items() if wall is not None and wall.thermal == "temperature"}
+    return [plane for plane in problem.planes if plane.wall[0] != "z" and plane.wall not in held]
+
+
+def still_vertices(plane: PlaneData) -> Bool[np.ndarray, "first second"]:
+    """Vertices of the plane that lie on wall, away from its ends and openings; all inner ones if none do."""
+    inner = np.zeros(plane.temperature_k.shape, bool)
+    inner[1:-1, 1:-1] = True
+    speed = np.abs(plane.velocity_m_s).max(axis=2)
+    still = inner & (speed <= _STILL * speed.max())
+    return still if still.any() else inner
+
+
+def _share_area(one: Patch, other: Patch) -> bool:
+    shared = [
+        min(h1, h2) - max(l1, l2)
+        for l1, h1, l2, h2 in zip(one.lower_m, one.upper_m, other.lower_m, other.upper_m, strict=True)
+    ]
+    return one.wall == other.wall and min(shared) > 1e-9
 
 
 def _opening(

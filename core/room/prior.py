@@ -18,6 +18,7 @@ from core.problem import Problem
 from core.room.grid import WALLS
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.room.openings import stated_walls
+from core.room.plane_openings import air_planes, still_vertices
 from core.room.setup import RoomLayout, RoomParameters
 from core.scene import Heater, Inlet, Outlet
 
@@ -175,17 +176,17 @@ def _heat_balance_m_s(
     brought = float(np.dot(_supply_m3_s(layout), inlet_excess_k - leaving))
     inside = _room_excess_k(problem, leaving)
     lost = float((areas * (inside - wall_excess_k)).sum())
-    found = brought / lost if abs(lost) > 1e-9 else _WALL_HEAT_M_S
+    # Heat that flows from cold to warm says that something else is missing, not how well walls conduct.
+    found = brought / lost if brought * lost > 0 else _WALL_HEAT_M_S
     return float(np.clip(found, _WALL_HEAT_M_S / 4, _WALL_HEAT_M_S * 4))
 
 
 def _room_excess_k(problem: Problem, leaving: float) -> float:
     """Mean temperature of the room's air: a side wall's plane, else what leaves."""
-    for plane in problem.planes:
-        if plane.wall[0] != "z":
-            still = np.abs(plane.velocity_m_s).max(axis=2) < 0.02 * np.abs(plane.velocity_m_s).max()
-            still[[0, -1]] = False
-            return float(plane.temperature_k[still].mean()) - problem.scene.air.ambient_temperature_k
+    for plane in air_planes(problem):
+        return (
+            float(plane.temperature_k[still_vertices(plane)].mean()) - problem.scene.air.ambient_temperature_k
+        )
     return leaving
 
 

@@ -12,6 +12,7 @@ from core.room.boundary import set_normal
 from core.room.march import March, MarchSettings, march
 from core.room.model import Flow
 from core.room.observe import Prediction
+from core.room.plane_openings import air_planes, still_vertices
 from core.room.prior import Prior, outflow_excess_k
 from core.room.room import Room, room, seen
 from core.room.setup import RoomParameters
@@ -74,13 +75,11 @@ def first_profile_k(problem: Problem, coarse: Room) -> Float[np.ndarray, " nz"]:
     """Excess temperature of each layer to start from: a plane's, else what leaves, else half the supply's."""
     heights = coarse.grid.centres_m(2)
     ambient = problem.scene.air.ambient_temperature_k
-    for plane in problem.planes:
-        if plane.wall[0] != "z":
-            still = np.abs(plane.velocity_m_s).max(axis=2) < 0.02 * np.abs(plane.velocity_m_s).max()
-            still[[0, -1]] = False
-            count = np.maximum(still.sum(0), 1)
-            profile = np.where(still, plane.temperature_k - ambient, 0.0).sum(0) / count
-            return np.interp(heights, plane.second_m[still.any(0)], profile[still.any(0)])
+    for plane in air_planes(problem):
+        still = still_vertices(plane)
+        count = np.maximum(still.sum(0), 1)
+        profile = np.where(still, plane.temperature_k - ambient, 0.0).sum(0) / count
+        return np.interp(heights, plane.second_m[still.any(0)], profile[still.any(0)])
     leaving = outflow_excess_k(problem)
     if leaving is None:
         inlets = [b for b in problem.scene.boundary if isinstance(b, Inlet)]

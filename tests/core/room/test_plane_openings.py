@@ -3,7 +3,7 @@ import pytest
 
 from core.geometry import Box, looking_along_y
 from core.problem import PlaneData, Problem
-from core.room.plane_openings import plane_openings, with_plane_openings
+from core.room.plane_openings import plane_openings, still_vertices, with_plane_openings
 from core.scene import FixedTexture, Heater, Inlet, Outlet, Patch, PlaneField, Scene, View
 
 Y, Z = np.linspace(-1.5, 1.5, 61), np.linspace(0.0, 3.0, 61)
@@ -65,3 +65,26 @@ def test_openings_are_taken_from_a_plane_only_where_none_are_stated():
 def test_a_plane_of_still_air_has_no_openings():
     still = PlaneData("x_min", Y, Z, np.full((61, 61), 295.0), np.zeros((61, 61)), np.zeros((61, 61, 3)))
     assert plane_openings(still) == []
+
+
+def test_walls_are_told_from_openings_and_a_plane_without_flow_is_all_wall():
+    still = still_vertices(plane())
+    assert not still[[0, -1]].any()
+    assert not still[:, [0, -1]].any()
+    # 12 x 4 vertices of each opening carry flow.
+    assert (~still[1:-1, 1:-1]).sum() == 2 * 12 * 4
+
+    at_rest = PlaneData("x_min", Y, Z, np.full((61, 61), 295.0), np.zeros((61, 61)), np.zeros((61, 61, 3)))
+    assert still_vertices(at_rest).sum() == 59 * 59
+
+
+def test_a_plane_whose_openings_make_no_sense_is_left_alone():
+    rng = np.random.default_rng(1)
+    velocity = 0.1 * rng.normal(size=(61, 61, 3))
+    noise = PlaneData("x_min", Y, Z, np.full((61, 61), 295.0), np.zeros((61, 61)), velocity)
+    camera = looking_along_y(position_m=(0.0, -8.0, 1.5), width_px=40, height_px=40, focal_px=80.0)
+    room = Box(lower_m=(0.0, -1.5, 0.0), upper_m=(3.0, 1.5, 3.0))
+    scene = Scene(room=room, views=(View(camera=camera),), light=FixedTexture())
+    problem = Problem(scene, (), (noise,))
+
+    assert with_plane_openings(problem) is problem
