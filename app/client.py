@@ -31,6 +31,7 @@ from app.api.uploads import Upload
 from app.durable import write_durably
 from app.errors import AirlensError, BadInputError
 from app.patterns import PatternName
+from app.plan_record import Plan
 
 T = TypeVar("T")
 ENDED = ("done", "failed", "cancelled")
@@ -192,6 +193,10 @@ class Client:
         """Calibrate a simulated rig."""
         path = f"/experiments/{experiment}/calibration"
         return self._ask(CalibrationResource, "POST", path, {"kind": "simulated"})
+
+    def plan(self, experiment: str) -> Plan:
+        """Return the newest plan; a job of kind `plan` makes one."""
+        return self._ask(Plan, "GET", f"/experiments/{experiment}/plan")
 
     def captures(self, experiment: str) -> list[CaptureResource]:
         """List the captures of an experiment."""

@@ -11,18 +11,20 @@ from app.boundary_files import read_planes, read_sensors
 from app.capture import Capture, load_capture
 from app.errors import BadInputError
 from app.experiment import Experiment
+from core.camera_noise import frame_variance
 from core.displacement import (
     Similarity,
     derivative_filter,
     fit_similarity,
     measure_shift,
     move_image,
+    resolve_window_px,
     similarity_basis,
     window_centres,
 )
 from core.problem import Problem, ShiftMeasurement
 from core.rays.visibility import sees_wall
-from core.scene import CameraNoise, Scene, View
+from core.scene import Scene, View
 
 Image = Float32[np.ndarray, "rows cols"]
 
@@ -61,22 +63,6 @@ def measure(experiment: Experiment, scene: Scene) -> Measurement:
     )
     images = [tuple(image.mean for image in capture.images) for capture in (reference, flow)]
     return Measurement(problem, images[0], images[1], tuple(drifts), tuple(notes))
-
-
-def resolve_window_px(scene: Scene, view: View) -> int:
-    """The window: as given, or a 128th of the picture's width (fine enough for the grids that use it)."""
-    if scene.solve.window_px != "auto":
-        return scene.solve.window_px
-    return int(np.clip(2 ** round(np.log2(view.camera.width_px / 128)), 8, 64))
-
-
-def frame_variance(image: Image, noise: CameraNoise) -> Image:
-    """Variance of one frame's pixel, in parts of full scale squared, by the noise model of the camera."""
-    full_scale = 2**noise.bits - 1
-    per_e = (full_scale - noise.dark_counts) / noise.full_well_e
-    electrons = np.maximum(image * full_scale - noise.dark_counts, 0) / per_e
-    variance = (electrons + noise.read_noise_e**2) * (per_e / full_scale) ** 2 + 1 / 12 / full_scale**2
-    return variance.astype(np.float32)
 
 
 def _measure_view(

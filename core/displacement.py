@@ -20,6 +20,7 @@ from jaxtyping import Float
 from scipy import ndimage
 
 from core.problem import ShiftMeasurement
+from core.scene import Scene, View
 from core.setting import SettingError, check_range, setting
 
 Image = Float[np.ndarray, "rows cols"]
@@ -96,6 +97,13 @@ def window_centres(shape: tuple[int, int], window_px: int) -> Float[np.ndarray, 
     """Centres (column, row) of the whole windows, row after row; pixel (0, 0) is the first's centre."""
     rows, cols = (np.arange(n // window_px) * window_px + (window_px - 1) / 2 for n in shape)
     return np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
+
+
+def resolve_window_px(scene: Scene, view: View) -> int:
+    """The window: as given, or a 128th of the picture's width (fine enough for the grids that use it)."""
+    if scene.solve.window_px != "auto":
+        return scene.solve.window_px
+    return int(np.clip(2 ** round(np.log2(view.camera.width_px / 128)), 8, 64))
 
 
 def standard_deviation_px(measurement: ShiftMeasurement) -> Float[np.ndarray, "windows 2"]:

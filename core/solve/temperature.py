@@ -5,10 +5,13 @@ Unknown is the excess refractivity n on a vertex grid, in which the data are lin
     1/2 sum_w (A n - d)^T W (A n - d)                        the shifts, noise and representation error
   + 1/2 sum_v (n - n_known)^2 / std^2                        planes, inlets, heaters
   + 1/2 sum_m (mean_m n - n_mean)^2 / std^2                  outlets, sensors
-  + 1/2 int (dx n')^2 / sx^2 + (dy n')^2 / sy^2 + (dz n')^2 / sz^2      n' = n - prior
+  + 1/2 int (n'^2 + lx^2 (dx n')^2 + ly^2 (dy n')^2 + lz^2 (dz n')^2) / s^2      n' = n - prior
 
-One view sees integrals along its rays: across them the data decide, along them the prior (smooth: sy is
-small) and the known planes do. The prior is the known plane carried away from its wall, or nothing.
+One view sees integrals along its rays: across them the data decide, along them the prior (smooth: ly is
+long) and the known planes do. The prior is the known plane's profile over height carried away from its
+wall, or nothing. Its size s is the one at which smooth random fields move the pattern as far as it moved
+(moment matching): a cool room is not given a hot room's freedom, and a projector beside the camera, which
+hardly sees broad fields, is not believed about them.
 
 Cost: conjugate gradients, two operator products an iteration, preconditioned by the smoothness term and
 the mean data term, which are diagonal under the cosine transform. Error: what varies along the rays and
@@ -22,6 +25,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import gaussian_filter
 from scipy.sparse.linalg import LinearOperator, cg
 
 from core.air import Air
@@ -48,16 +52,21 @@ class ShiftOperator(Protocol):
         ...
 
 
+# A thousandth of a kelvin, as excess refractivity.
+_LEAST_SIZE = 1e-9
+_DRAWS = 4
+
+
 @setting
 class TemperatureSettings:
-    """Smoothness in kelvin a metre (the expected size of gradients), and when to stop.
+    """Lengths over which the air varies, in parts of the room's longest edge, and when to stop.
 
-    `across_k_m` and `along_k_m` are across and along the view; `representation` is the part of the shift's
-    size that this grid cannot represent, added to the noise.
+    `across` and `along` are across and along the view; `representation` is the part of the shift's size
+    that this grid cannot represent, added to the noise.
     """
 
-    across_k_m: float = 2.0
-    along_k_m: float = 1.0
+    across: float = 0.04
+    along: float = 0.5
     representation: float = 0.3
     tolerance: float = 1e-3
     max_iterations: int = 400
@@ -73,11 +82,12 @@ class _System:
     known: KnownTemperature
     per_k: float
     stiffness: tuple[float, float, float]
+    mass: float
     slopes: tuple[float, float]
 
     def smooth(self, n: Volume) -> Volume:
-        """Gradient of the smoothness term."""
-        total = np.zeros_like(n)
+        """Gradient of the prior's terms: size and smoothness."""
+        total = self.mass * n
         for axis, factor in enumerate(self.stiffness):
             difference = factor * np.diff(n, axis=axis)
             low = [slice(None)] * 3
@@ -125,13 +135,14 @@ def solve_temperature(
     per_k = air.ambient_refractivity / air.ambient_temperature_k
     prior = _excess(air, prior_temperature(problem, grid) - air.ambient_temperature_k)
     weights = tuple(data_weight(s, settings.representation) for s in problem.shifts)
-    cell = float(np.prod(grid.spacing_m)) / float(np.prod(problem.scene.room.size_m))
-    scales = (settings.across_k_m, settings.along_k_m, settings.across_k_m)
-    stiffness = [cell / (h * s * per_k) ** 2 for h, s in zip(grid.spacing_m, scales, strict=True)]
-    # A room's worth of independent gradients: one a hundred vertices.
-    stiffness = [f * np.prod(grid.shape) / 100 for f in stiffness]
-    stiff = (stiffness[0], stiffness[1], stiffness[2])
-    system = _System(grid, operators, weights, known, per_k, stiff, steepest_slopes(problem.scene))
+    size = prior_size(operators, weights, problem.shifts, prior, grid, settings)
+    # A room's worth of independent values: one a hundred vertices.
+    mass = 0.01 / size**2
+    lengths = _lengths_m(grid, settings)
+    stiff = [mass * (length / h) ** 2 for length, h in zip(lengths, grid.spacing_m, strict=True)]
+    stiffness = (stiff[0], stiff[1], stiff[2])
+    slopes = steepest_slopes(problem.scene)
+    system = _System(grid, operators, weights, known, per_k, stiffness, mass, slopes)
     n, iterations, settled = _minimise(system, problem.shifts, prior, air, settings, on_event)
     temperature = air.ambient_refractivity * air.ambient_temperature_k / (n + air.ambient_refractivity)
     x, y, z = grid.axes_m
@@ -161,6 +172,38 @@ def prior_temperature(problem: Problem, grid: VertexGrid) -> Volume:
         on_grid = np.expand_dims(plane_on_grid(grid, plane, plane.temperature_k), axis)
         volume[...] = np.median(on_grid, axis=(0, 1), keepdims=True)
     return volume
+
+
+def prior_size(
+    operators: tuple[ShiftOperator, ...],
+    weights: tuple[Float[np.ndarray, "windows 2 2"], ...],
+    shifts: tuple[ShiftMeasurement, ...],
+    prior: Volume,
+    grid: VertexGrid,
+    settings: TemperatureSettings,
+) -> float:
+    """Rms of n - prior at which smooth random fields move the pattern as far as it moved beyond its noise."""
+    random = np.random.default_rng(0)
+    sigma = [length / h for length, h in zip(_lengths_m(grid, settings), grid.spacing_m, strict=True)]
+    unit, seen, noise = 0.0, 0.0, 0.0
+    draws = [
+        gaussian_filter(random.standard_normal(grid.shape), sigma, mode="reflect") for _ in range(_DRAWS)
+    ]
+    for operator, weight, shift in zip(operators, weights, shifts, strict=True):
+        used = weight[:, 0, 0] > 0
+        rest = (shift.displacement_px - operator.apply(prior))[used]
+        seen += float(np.sum(rest**2))
+        noise += float(np.sum(np.linalg.inv(shift.information_per_px2[used]).trace(axis1=1, axis2=2)))
+        unit += float(np.mean([np.sum(operator.apply(d / d.std())[used] ** 2) for d in draws]))
+    if unit == 0.0:
+        return _LEAST_SIZE
+    # No less than a tenth of what noise alone would look like: zero would forbid every departure.
+    return max(float(np.sqrt(max(seen - noise, 0.01 * noise) / unit)), _LEAST_SIZE)
+
+
+def _lengths_m(grid: VertexGrid, settings: TemperatureSettings) -> tuple[float, float, float]:
+    longest_m = max(grid.box.size_m)
+    return settings.across * longest_m, settings.along * longest_m, settings.across * longest_m
 
 
 def _excess(air: Air, excess_k: np.ndarray) -> np.ndarray:
@@ -237,7 +280,7 @@ def _preconditioner(system: _System) -> LinearOperator:
     smooth = fx * lx[:, None] + fz * lz[None]
     across = dx[:, None] / spacing[0] ** 2 + dz[None] / spacing[2] ** 2
     matrices = (
-        (smooth[..., None, None] + 1e-3 * fx * lx[1]) * np.eye(shape[1])
+        (smooth[..., None, None] + system.mass) * np.eye(shape[1])
         + fy * _laplacian(shape[1])
         + across[..., None, None] * levers * _coherence(system)
     )

@@ -1,0 +1,103 @@
+"""What each preset costs and finds, before it runs: work counted from the scene, speed from this machine.
+
+    seconds = fixed + rate * work,      memory = fixed + rate * size
+
+Work is a count of the dominant loop: windows and vertices of the normal equations (draft), cell-steps of
+every march (standard, reference), cells (grid), iterations (paper). `airlens bench calibrate` measures the
+two numbers of each preset on a machine. The error expected is the one that the reference rooms showed for
+that information, times the expected flow's own departures.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from core.plan.expected import ExpectedFlow
+from core.problem import Problem
+from core.room.prior import room_prior
+from core.room.room import room
+from core.room.runs import RoomSettings
+from core.scene import Heater, Inlet, Wall
+from core.setting import setting
+from core.solve.draft import draft_grid
+from core.solve.room import closure_name
+
+Level = Literal["walls", "plane", "images"]
+
+
+@dataclass(frozen=True)
+class Work:
+    """How much a preset would do, and how large its arrays are, in the units of its own loop."""
+
+    loops: float
+    size: float
+
+
+@setting
+class Speed:
+    """One preset on one machine: seconds and megabytes as straight lines in its work and its size."""
+
+    fixed_s: float
+    s_per_work: float
+    fixed_mb: float
+    mb_per_size: float
+
+    def seconds(self, work: Work) -> float:
+        """Solver time."""
+        return self.fixed_s + self.s_per_work * work.loops
+
+    def megabytes(self, work: Work) -> float:
+        """Peak memory."""
+        return self.fixed_mb + self.mb_per_size * work.size
+
+
+def draft_work(problem: Problem, windows: int) -> Work:
+    """Conjugate gradients: products of windows with slabs, and the vertices' own terms."""
+    nx, ny, nz = draft_grid(problem.scene).shape
+    return Work(loops=float(windows * ny * (nx + nz)), size=float(windows * ny + nx * ny * nz))
+
+
+def room_work(problem: Problem, flow: ExpectedFlow, settings: RoomSettings) -> Work | None:
+    """Cell-steps of every march; None where nothing drives a flow."""
+    if flow.step_s is None or flow.cell_m is None:
+        return None
+    scene = problem.scene
+    coarse = room(scene, settings.coarse_cells, closure_name(scene))
+    fine = room(scene, settings.cells, closure_name(scene))
+    parameters = len(room_prior(problem, coarse.layout).active())
+    restarts = (1 + parameters) * settings.restart_s
+    # One coarse correction that is tried, and the second closure's run, beside the Jacobian's.
+    coarse_s = settings.settle_s + restarts + 2 * settings.restart_s
+    fine_s = settings.refine_s + max(settings.rounds - 1, 0) * settings.refine_s + settings.final_s
+    steps = flow.pace / flow.step_s * flow.cell_m
+    loops = 0.0
+    for place, seconds in ((coarse, coarse_s), (fine, fine_s)):
+        cells = float(np.prod(place.grid.cells))
+        loops += cells * seconds * steps / min(place.grid.spacing_m)
+    return Work(loops, float(np.prod(fine.grid.cells)))
+
+
+def knows_walls(problem: Problem) -> bool:
+    """Whether the scene states what drives the air and where its walls are: what a room needs."""
+    boundary = problem.scene.boundary
+    return any(isinstance(b, Inlet | Heater) for b in boundary) and any(isinstance(b, Wall) for b in boundary)
+
+
+def level_of(problem: Problem) -> Level:
+    """How much is known: walls and what drives the air, a plane, or little more than the images."""
+    if knows_walls(problem):
+        return "walls"
+    return "plane" if problem.planes else "images"
+
+
+def grid_work(problem: Problem) -> Work:
+    """Cells of the finest level."""
+    chosen = problem.scene.solve.grid
+    cells = float((32 if chosen == "auto" else chosen) ** 3)
+    return Work(cells, cells)
+
+
+def paper_work() -> Work:
+    """Iterations of the published recipe."""
+    return Work(80_000.0, 1.0)

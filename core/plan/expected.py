@@ -1,0 +1,135 @@
+"""The air that a scene leads one to expect: enough for the size and the shape of a shift, not for more.
+
+Where supply or heaters are stated the room is marched coarsely (seconds); otherwise a plume of the
+largest known contrast stands in the middle of the room. Validity: a factor of about 1.5 in the shift.
+"""
+
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from core.air import Air
+from core.fields import SplineField, plume, through_vertices
+from core.knowledge import VertexGrid
+from core.problem import Problem
+from core.room.model import longest_step_s
+from core.room.plane_openings import with_plane_openings
+from core.room.prior import room_prior
+from core.room.room import room
+from core.room.runs import RoomSettings, settled
+from core.scene import Heater, Inlet, Scene
+from core.setting import SettingError
+from core.solve.room import closure_name
+
+Volume = Float[np.ndarray, "nx ny nz"]
+
+# Without any statement about the air: what a person or a computer makes.
+DEFAULT_EXCESS_K = 10.0
+_COARSE = RoomSettings(coarse_cells=20, settle_s=60.0)
+_VERTICES = 33
+COURANT = 0.45
+
+
+@dataclass(frozen=True)
+class ExpectedFlow:
+    """Excess temperature on a vertex grid, in words where it comes from, and its pace where it was marched.
+
+    `step_s` is the longest stable time step on cells of `cell_m`, for the cost of finer marches.
+    """
+
+    grid: VertexGrid
+    excess_k: Volume
+    source: str
+    speed_rms_m_s: float | None = None
+    pressure_rms_m2_s2: float | None = None
+    step_s: float | None = None
+    cell_m: float | None = None
+    pace: float = 1.0
+
+    def excess_refractivity(self, air: Air) -> Float[Array, "nx ny nz"]:
+        """N - N0 on the vertices."""
+        return air.excess_refractivity(jnp.asarray(self.excess_k, jnp.float32))
+
+    def field(self, air: Air) -> SplineField:
+        """Smooth through the vertices: the slope of a trilinear field jumps, that of air does not."""
+        box = self.grid.box
+        return through_vertices(box.lower_m, box.upper_m, np.asarray(self.excess_refractivity(air)))
+
+
+def largest_contrast_k(problem: Problem) -> float | None:
+    """The largest stated |T - T0|, from inlets, heaters, planes and sensors; None where nothing is stated."""
+    ambient = problem.scene.air.ambient_temperature_k
+    stated = [b.temperature_k for b in problem.scene.boundary if isinstance(b, Inlet | Heater)]
+    stated += [float(t) for plane in problem.planes for t in np.percentile(plane.temperature_k, [0.5, 99.5])]
+    stated += [float(t) for sensor in problem.sensors for t in sensor.temperature_k if np.isfinite(t)]
+    return max((abs(t - ambient) for t in stated), default=None)
+
+
+def expected_flow(problem: Problem, excess_k: float | None = None) -> ExpectedFlow:
+    """What to expect; `excess_k` sets its largest contrast.
+
+    Raises SettingError for a contrast that is not a finite number above 0, or at which air is below 0 K.
+    """
+    ambient = problem.scene.air.ambient_temperature_k
+    if excess_k is not None and not (np.isfinite(excess_k) and 0 < excess_k < 5000):
+        raise SettingError(
+            f"The expected contrast is {excess_k:g} K; expected a temperature difference above 0 and below "
+            "5000 K, such as 10."
+        )
+    problem = with_plane_openings(problem)
+    known = largest_contrast_k(problem)
+    if any(isinstance(b, Inlet | Heater) for b in problem.scene.boundary) and known:
+        marched = _marched(problem)
+        return marched if excess_k is None else _rescaled(marched, excess_k, known)
+    peak_k = excess_k or known or DEFAULT_EXCESS_K
+    grid = VertexGrid(problem.scene.room, (_VERTICES, _VERTICES, _VERTICES))
+    reason = "asked for" if excess_k else "the largest stated" if known else "assumed: nothing is stated"
+    excess = _plume_k(problem.scene, grid, min(peak_k, 0.9 * 5000 - ambient))
+    return ExpectedFlow(grid, excess, f"a plume of {peak_k:.3g} K in the middle of the room ({reason})")
+
+
+def _marched(problem: Problem) -> ExpectedFlow:
+    scene = problem.scene
+    coarse = room(scene, _COARSE.coarse_cells, closure_name(scene))
+    shape = (_VERTICES, _VERTICES, _VERTICES)
+    prior = room_prior(problem, coarse.layout)
+    done = settled(coarse, prior, problem, _COARSE, shape, lambda _: None)
+    excess = np.asarray(done.seen.excess_k, np.float64)
+    step_s = float(longest_step_s(done.flow.last, coarse.model(prior.mean), COURANT))
+    speed = float(np.sqrt(np.mean(np.sum(np.square(done.seen.velocity_m_s), -1))))
+    pressure = done.seen.pressure_m2_s2
+    return ExpectedFlow(
+        VertexGrid(scene.room, shape),
+        excess,
+        f"the stated supply and walls, marched for {done.flow.model_s:.0f} s on {_COARSE.coarse_cells} cells an edge",
+        speed,
+        float(np.std(pressure)),
+        step_s,
+        min(coarse.grid.spacing_m),
+        coarse.pace,
+    )
+
+
+def _rescaled(flow: ExpectedFlow, excess_k: float, known_k: float) -> ExpectedFlow:
+    return ExpectedFlow(
+        flow.grid,
+        flow.excess_k * (excess_k / known_k),
+        f"{flow.source}, scaled to {excess_k:g} K",
+        flow.speed_rms_m_s,
+        flow.pressure_rms_m2_s2,
+        flow.step_s,
+        flow.cell_m,
+        flow.pace,
+    )
+
+
+def _plume_k(scene: Scene, grid: VertexGrid, peak_k: float) -> Volume:
+    """A Gaussian plume a fifteenth of the room wide."""
+    radius_m = max(min(scene.room.size_m) / 15, max(grid.spacing_m))
+    unit = plume(scene.air, peak_k=peak_k, centre_m=scene.room.centre_m, radius_m=radius_m)
+    points = np.stack(np.meshgrid(*grid.axes_m, indexing="ij"), -1).reshape(-1, 3)
+    values = np.asarray(unit.excess(jnp.asarray(points, jnp.float32)), np.float64).reshape(grid.shape)
+    n0, t0 = scene.air.ambient_refractivity, scene.air.ambient_temperature_k
+    return n0 * t0 / (n0 + values) - t0
