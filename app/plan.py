@@ -16,7 +16,8 @@ from app.presets import REFERENCE, STANDARD
 from app.tradeoff import ExpectedError, expected_error
 from core.displacement import resolve_window_px
 from core.metrics import departure, inner, rms
-from core.plan.choices import Choice, Resolution, resolve
+from core.plan.choice import Choice
+from core.plan.choices import Resolution, resolve
 from core.plan.cost import Speed, Work, draft_work, grid_work, knows_walls, level_of, paper_work, room_work
 from core.plan.expected import ExpectedFlow, expected_flow
 from core.plan.seen import seen
@@ -155,7 +156,9 @@ def _view_line(problem: Problem, view: int, flow: ExpectedFlow, found: Signal) -
         shift_p99_px=found.shift.percentile_px(99),
         signal_to_noise=found.snr,
         picture_signal_to_noise=found.picture_snr if np.isfinite(noise_px) else 0.0,
-        smallest_visible_k=found.smallest_visible_k if visible else None,
+        smallest_visible_k=found.smallest_visible_k
+        if visible and np.isfinite(found.smallest_visible_k)
+        else None,
         frames=frames,
         frames_needed=frames * found.frames_factor if visible and found.frames_factor < 1e12 else None,
         other_light=other.light.kind,

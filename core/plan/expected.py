@@ -19,7 +19,7 @@ from core.room.plane_openings import with_plane_openings
 from core.room.prior import room_prior
 from core.room.room import room
 from core.room.runs import RoomSettings, settled
-from core.scene import Heater, Inlet, Scene
+from core.scene import Heater, Inlet, Scene, Wall
 from core.setting import SettingError
 from core.solve.room import closure_name
 
@@ -59,12 +59,17 @@ class ExpectedFlow:
 
 
 def largest_contrast_k(problem: Problem) -> float | None:
-    """The largest stated |T - T0|, from inlets, heaters, planes and sensors; None where nothing is stated."""
-    ambient = problem.scene.air.ambient_temperature_k
+    """The largest stated |T - T0|, from inlets, heaters, walls, planes and sensors; None where nothing is stated."""
+    return max((abs(excess) for excess in _stated_excesses_k(problem)), default=None)
+
+
+def _stated_excesses_k(problem: Problem) -> list[float]:
     stated = [b.temperature_k for b in problem.scene.boundary if isinstance(b, Inlet | Heater)]
+    walls = [b.temperature_k for b in problem.scene.boundary if isinstance(b, Wall)]
+    stated += [t for t in walls if t is not None]
     stated += [float(t) for plane in problem.planes for t in np.percentile(plane.temperature_k, [0.5, 99.5])]
     stated += [float(t) for sensor in problem.sensors for t in sensor.temperature_k if np.isfinite(t)]
-    return max((abs(t - ambient) for t in stated), default=None)
+    return [t - problem.scene.air.ambient_temperature_k for t in stated]
 
 
 def expected_flow(problem: Problem, excess_k: float | None = None) -> ExpectedFlow:
@@ -96,7 +101,10 @@ def _marched(problem: Problem) -> ExpectedFlow:
     shape = (_VERTICES, _VERTICES, _VERTICES)
     prior = room_prior(problem, coarse.layout)
     done = settled(coarse, prior, problem, _COARSE, shape, lambda _: None)
-    excess = np.asarray(done.seen.excess_k, np.float64)
+    excess = _without_layers(np.asarray(done.seen.excess_k, np.float64))
+    # A coarse march that has not settled may overshoot; air is between what drives it.
+    stated = [0.0, *_stated_excesses_k(problem)]
+    excess = np.clip(excess, min(stated), max(stated))
     step_s = float(longest_step_s(done.flow.last, coarse.model(prior.mean), COURANT))
     speed = float(np.sqrt(np.mean(np.sum(np.square(done.seen.velocity_m_s), -1))))
     pressure = done.seen.pressure_m2_s2
@@ -110,6 +118,11 @@ def _marched(problem: Problem) -> ExpectedFlow:
         min(coarse.grid.spacing_m),
         coarse.pace,
     )
+
+
+def _without_layers(excess_k: Volume) -> Volume:
+    """Wall vertices as their neighbours: a thermal layer fills less than a cell, and less than a window."""
+    return np.pad(excess_k[1:-1, 1:-1, 1:-1], 1, mode="edge")
 
 
 def _rescaled(flow: ExpectedFlow, excess_k: float, known_k: float) -> ExpectedFlow:

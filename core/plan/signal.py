@@ -32,7 +32,7 @@ class ShiftMap:
     displacement_px: Float[np.ndarray, "windows 2"]
     stride: int
 
-    def percentile_px(self, share: float) -> float:
+    def percentile_px(self, share: int) -> float:
         """A percentile of the displacements' length."""
         return float(np.percentile(np.linalg.norm(self.displacement_px, axis=1), share))
 
@@ -44,6 +44,7 @@ class Signal:
     shift: ShiftMap
     noise: ShiftNoise
     contrast_k: float
+    ambient_k: float
 
     @property
     def snr(self) -> float:
@@ -58,8 +59,10 @@ class Signal:
 
     @property
     def smallest_visible_k(self) -> float:
-        """The contrast at which the flow is just visible in one window."""
-        return self.contrast_k * VISIBLE / max(self.snr, 1e-300)
+        """The contrast at which the flow is just visible in one window; infinite where no heat suffices."""
+        # Refractivity falls by dT / (T0 + dT) of itself, and can fall no further than to nothing.
+        share = self.contrast_k / (self.ambient_k + self.contrast_k) * VISIBLE / max(self.snr, 1e-150)
+        return self.ambient_k * share / (1.0 - share) if share < 1.0 else float("inf")
 
     @property
     def frames_factor(self) -> float:
@@ -70,7 +73,8 @@ class Signal:
 def signal(scene: Scene, view: int, flow: ExpectedFlow, noise: ShiftNoise) -> Signal:
     """What `view` sees of `flow`. Raises SettingError for a view that sees nothing of the wall."""
     contrast_k = float(np.abs(flow.excess_k).max())
-    return Signal(shift_map(scene, view, flow, noise.window_px), noise, contrast_k)
+    shift = shift_map(scene, view, flow, noise.window_px)
+    return Signal(shift, noise, contrast_k, scene.air.ambient_temperature_k)
 
 
 def shift_map(scene: Scene, view: int, flow: ExpectedFlow, window_px: int) -> ShiftMap:

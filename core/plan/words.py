@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from core.plan.choices import Choice
+from core.plan.choice import Choice
 from core.plan.expected import ExpectedFlow
 from core.plan.seen import Seen
 from core.plan.signal import VISIBLE, Signal, lever_m
