@@ -24,7 +24,7 @@ from app.api.experiments import ExperimentLine, ExperimentResource
 from app.api.jobs import Curves, JobResource
 from app.api.problems import MEDIA_TYPE, Problem
 from app.api.projector import ProjectorResource, WireLine
-from app.api.results import PresetResource, ResultLine, ResultResource
+from app.api.results import ComparisonResource, PresetResource, ResultLine, ResultResource
 from app.api.screen import ScreenResource
 from app.api.shift import ShiftResource
 from app.api.uploads import Upload
@@ -274,7 +274,18 @@ class Client:
         """Return the report as one page of HTML."""
         return self._bytes(f"/experiments/{experiment}/results/{result}/report").text
 
-    def export(self, experiment: str, result: str, form: Literal["nc", "vti", "csv"], file: Path) -> Path:
+    def comparison(self, experiment: str, result: str) -> ComparisonResource:
+        """Return how a result compares with a simulated room's truth and with point sensors."""
+        path = f"/experiments/{experiment}/results/{result}/comparison"
+        return self._ask(ComparisonResource, "GET", path)
+
+    def export(
+        self,
+        experiment: str,
+        result: str,
+        form: Literal["nc", "h5", "vti", "csv", "zip", "png"],
+        file: Path,
+    ) -> Path:
         """Write a result as a file for another program."""
         path = f"/experiments/{experiment}/results/{result}/exports/{form}"
         content = self._bytes(path).content

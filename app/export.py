@@ -1,4 +1,4 @@
-"""`export`: a result as NetCDF, VTK image data, or CSV, with equal values in each."""
+"""`export`: a result as NetCDF (or HDF5), VTK image data, CSV, an OpenFOAM case, or a picture."""
 
 import shutil
 from pathlib import Path
@@ -10,10 +10,12 @@ from pyevtk.hl import imageToVTK
 from app.durable import write_durably
 from app.errors import BadInputError
 from app.experiment import open_experiment
+from app.export_openfoam import write_openfoam
+from app.figures import as_png, slices_figure
 from app.results import read_result, to_dataset
 from core.result import Solution
 
-ExportFormat = Literal["nc", "vti", "csv"]
+ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png"]
 
 
 def export(folder: Path, kind: ExportFormat, output: Path | None = None, result: Path | None = None) -> Path:
@@ -23,10 +25,11 @@ def export(folder: Path, kind: ExportFormat, output: Path | None = None, result:
     path = output or source.with_name(f"result-export.{kind}")
     if path.suffix != f".{kind}":
         raise BadInputError(f"The output is {path.name}; expected a name that ends in .{kind}.")
-    if kind == "nc":
+    if kind in ("nc", "h5"):  # NetCDF-4 is HDF5
         write_durably(path, lambda temporary: shutil.copyfile(source, temporary))
     else:
-        writer = {"vti": _write_vti, "csv": _write_csv}[kind]
+        writers = {"vti": _write_vti, "csv": _write_csv, "zip": write_openfoam, "png": _write_png}
+        writer = writers[kind]
         solution = read_result(source)
         write_durably(path, lambda temporary: writer(temporary, solution))
     return path
@@ -58,3 +61,9 @@ def _write_csv(path: Path, solution: Solution) -> None:
     table = dataset.to_dataframe().reset_index()
     table.columns = [f"{name} [{dataset[name].attrs['units']}]" for name in table.columns]
     table.to_csv(path, index=False, float_format="%.9g")
+
+
+def _write_png(path: Path, solution: Solution) -> None:
+    """The middle planes of the temperature, with arrows where velocity is known."""
+    level_k = float(np.round(np.mean(solution.temperature_k), 1))
+    path.write_bytes(as_png(slices_figure(solution, level_k)))

@@ -36,6 +36,17 @@ class RoomVolume:
     scalars: dict[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Beside:
+    """One quantity on the result's vertices: what is true, and found minus true."""
+
+    name: str
+    unit: str
+    label: str
+    truth: Float[np.ndarray, "nx ny nz"]
+    error: Float[np.ndarray, "nx ny nz"]
+
+
 def read_volume(path: Path) -> RoomVolume:
     """Read and check a volume. Raises BadInputError for anything that is not one."""
     arrays = _read_npz(path)

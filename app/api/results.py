@@ -12,16 +12,16 @@ from app.api.headers import REPORT_POLICY
 from app.api.problems import ApiError
 from app.api.services import Given, Services
 from app.api.strict import Identifier, Strict
-from app.api.volumes import Axis, Encoding, Packed, Volume, cut, pack, volumes_of
+from app.api.volumes import Axis, Encoding, Kind, Packed, Shown, Volume, cut, pack
 from app.experiment import read_manifest
-from core.result import Solution
+
+Form = Literal["nc", "h5", "vti", "csv", "zip", "png"]
 
 router = APIRouter(tags=["results"])
 NUMBERS = body(
     "application/octet-stream", "Little-endian numbers in C order; value = X-Offset + X-Scale * number."
 )
 FILE = body("application/octet-stream", "A file to keep.")
-Form = Literal["nc", "vti", "csv"]
 PAGE = body("text/html", "A page in one file.", text=True)
 Code = Annotated[Encoding, Query(description="u16: scaled; f16: about the middle; f32: as it is.")]
 
@@ -49,6 +49,7 @@ class FieldResource(Strict):
     name: str
     unit: str
     label: str
+    kind: Kind
     minimum: float
     maximum: float
     mean: float
@@ -69,6 +70,32 @@ class ResultResource(Strict):
     manifest: dict[str, Any]
 
 
+class ScoreResource(Strict):
+    """One figure against the truth, in words."""
+
+    name: str
+    value: float
+    unit: str
+
+
+class ReadingResource(Strict):
+    """One quantity at one point sensor: measured, with its standard deviation, and found there."""
+
+    name: str
+    unit: str
+    position_m: list[float]
+    measured: float
+    std: float
+    found: float
+
+
+class ComparisonResource(Strict):
+    """A result against what is known better; empty lists where nothing is."""
+
+    scores: list[ScoreResource]
+    readings: list[ReadingResource]
+
+
 @router.get("/experiments/{experiment}/results")
 def list_results(given: Given, experiment: Identifier) -> list[ResultLine]:
     """List the results, newest first; interrupted ones last."""
@@ -84,13 +111,14 @@ def list_results(given: Given, experiment: Identifier) -> list[ResultLine]:
 @router.get("/experiments/{experiment}/results/{result}")
 def read_result(given: Given, experiment: Identifier, result: Identifier) -> ResultResource:
     """Return one result without its numbers."""
-    folder, solution = _solution(given, experiment, result)
+    folder, shown = _shown(given, experiment, result)
+    solution = shown.solution
     return ResultResource(
         result=result,
         x_m=solution.x_m.tolist(),
         y_m=solution.y_m.tolist(),
         z_m=solution.z_m.tolist(),
-        fields=[_field(volume) for volume in volumes_of(solution).values()],
+        fields=[_field(volume) for volume in shown.volumes.values()],
         outcome=solution.outcome.name,
         advice=solution.outcome.value,
         solver_s=solution.solver_s,
@@ -106,8 +134,8 @@ def read_volume(
     given: Given, experiment: Identifier, result: Identifier, field: Identifier, encoding: Code = "u16"
 ) -> Response:
     """Return a whole field, index order [ix, iy, iz]."""
-    _, solution = _solution(given, experiment, result)
-    return _numbers(pack(_volume(solution, field).values, encoding))
+    _, shown = _shown(given, experiment, result)
+    return _numbers(pack(_volume(shown, field).values, encoding))
 
 
 @router.get(
@@ -123,8 +151,8 @@ def read_slice(
     encoding: Code = "f32",
 ) -> Response:
     """Return the plane of vertices at `index` along `axis`; the two other axes in the order x, y, z."""
-    _, solution = _solution(given, experiment, result)
-    return _numbers(pack(cut(_volume(solution, field).values, axis, index), encoding))
+    _, shown = _shown(given, experiment, result)
+    return _numbers(pack(cut(_volume(shown, field).values, axis, index), encoding))
 
 
 @router.get("/experiments/{experiment}/results/{result}/history")
@@ -136,6 +164,31 @@ def read_history(given: Given, experiment: Identifier, result: Identifier) -> li
     return [
         _finite(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()
     ]
+
+
+@router.get("/experiments/{experiment}/results/{result}/comparison")
+def read_comparison(given: Given, experiment: Identifier, result: Identifier) -> ComparisonResource:
+    """Return how a result compares with what is known better: a simulated room's truth, point sensors."""
+    # Imported here: the array library behind them takes a second to load.
+    from app.beside import readings, scores, truth_file
+
+    _, shown = _shown(given, experiment, result)
+    found = given.folders.open(experiment)
+    truth = truth_file(found)
+    return ComparisonResource(
+        scores=[] if truth is None else _score_lines(scores(shown.solution, truth)),
+        readings=[
+            ReadingResource(
+                name=one.name,
+                unit=one.unit,
+                position_m=list(one.position_m),
+                measured=one.measured,
+                std=one.std,
+                found=one.found,
+            )
+            for one in readings(found, shown.solution)
+        ],
+    )
 
 
 @router.get("/experiments/{experiment}/results/{result}/report", response_class=Response, responses=PAGE)
@@ -152,7 +205,7 @@ def read_report(given: Given, experiment: Identifier, result: Identifier) -> Res
     "/experiments/{experiment}/results/{result}/exports/{form}", response_class=Response, responses=FILE
 )
 def read_export(given: Given, experiment: Identifier, result: Identifier, form: Form) -> Response:
-    """Return the result as a file for another program: NetCDF, VTK image data, or CSV."""
+    """Return the result as a file: NetCDF, HDF5, VTK image data, CSV, an OpenFOAM case (zip), a picture."""
     # Imported here: the writers take a second to load.
     from app.export import export
 
@@ -169,20 +222,38 @@ def list_presets() -> list[PresetResource]:
     return [PresetResource(preset=name, about=_first_line(solve)) for name, solve in PRESETS.items()]
 
 
+def _score_lines(scored: dict[str, Any]) -> list[ScoreResource]:
+    """The figures that README tells, by name; left out where a quantity was not solved for."""
+    temperature, velocity, pressure = scored["T"], scored["u"], scored["p"]
+    lines = [
+        ("T: rms error", temperature["rms_K"], "K"),
+        ("T: rms error of the still air everywhere, for comparison", temperature["trivial"]["ambient"], "K"),
+        ("T: rms error of departures from each height's mean", temperature["departure_of_departures"], "1"),
+    ]
+    if velocity is not None:
+        lines.append(("velocity: rms error over the rms of velocity", velocity["rel"], "1"))
+        lines.append(("velocity: the same in the jet", velocity["jet_rel"], "1"))
+    if pressure is not None:
+        lines.append(("p: rms error over the rms of p", pressure["rel"], "1"))
+    return [ScoreResource(name=n, value=v, unit=u) for n, v, u in lines if v is not None]
+
+
 def _first_line(solve: object) -> str:
     return (solve.__doc__ or "").strip().split("\n")[0]
 
 
-def _solution(given: Services, experiment: str, result: str) -> tuple[Path, Solution]:
+def _shown(given: Services, experiment: str, result: str) -> tuple[Path, Shown]:
+    from app.beside import truth_file
+
     folder = given.folders.item(experiment, "result", result)
-    return folder, given.solutions.read(folder / "result.nc")
+    truth = truth_file(given.folders.open(experiment))
+    return folder, given.solutions.read(folder / "result.nc", truth)
 
 
-def _volume(solution: Solution, field: str) -> Volume:
-    volumes = volumes_of(solution)
-    if field not in volumes:
-        raise ApiError("not_found", f"This result has no field {field!r}; it has {', '.join(volumes)}.")
-    return volumes[field]
+def _volume(shown: Shown, field: str) -> Volume:
+    if field not in shown.volumes:
+        raise ApiError("not_found", f"This result has no field {field!r}; it has {', '.join(shown.volumes)}.")
+    return shown.volumes[field]
 
 
 def _line(folder: Path) -> ResultLine:
@@ -201,6 +272,7 @@ def _field(volume: Volume) -> FieldResource:
         name=volume.name,
         unit=volume.unit,
         label=volume.label,
+        kind=volume.kind,
         minimum=float(values.min()),
         maximum=float(values.max()),
         mean=float(values.mean(dtype="float64")),

@@ -10,10 +10,12 @@ import numpy as np
 from jaxtyping import Float32
 
 from app.api.problems import ApiError
+from app.truth import Beside
 from core.result import Solution
 
 Encoding = Literal["u16", "f16", "f32"]
 Axis = Literal["x", "y", "z"]
+Kind = Literal["found", "uncertainty", "truth", "error"]
 KEPT = 4
 
 
@@ -43,6 +45,7 @@ class Volume:
     name: str
     unit: str
     label: str
+    kind: Kind
     values: Float32[np.ndarray, "nx ny nz"]
 
 
@@ -63,22 +66,40 @@ def volumes_of(solution: Solution) -> dict[str, Volume]:
             values = None if vectors is None else vectors[..., index]
             found["uvw"[index] + stem] = ("m s-1", f"{words} along {axis}", values)
     return {
-        name: Volume(name, unit, label, np.asarray(values, np.float32))
+        name: Volume(
+            name,
+            unit,
+            label,
+            "uncertainty" if "_" in name or name == "informed" else "found",
+            np.asarray(values, np.float32),
+        )
         for name, (unit, label, values) in found.items()
         if values is not None
     }
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A solution with every volume that can be looked at."""
+
+    solution: Solution
+    volumes: dict[str, Volume]
 
 
 class SolutionCache:
     """The last few solutions; one that was written again is read again."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[tuple[Path, int], Solution] = OrderedDict()
+        self._kept: OrderedDict[tuple[Path, int], Shown] = OrderedDict()
         self._lock = threading.Lock()
 
-    def read(self, path: Path) -> Solution:
-        """Return the solution in `path`. Raises ApiError when there is none, BadInputError when damaged."""
+    def read(self, path: Path, truth: Path | None) -> Shown:
+        """Return the solution in `path`, beside the truth where there is one.
+
+        Raises ApiError when there is no solution, BadInputError when one of them is damaged.
+        """
         # Imported here: xarray takes a second, and a service should answer before that.
+        from app.beside import beside_truth
         from app.results import read_result
 
         if not path.is_file():
@@ -86,11 +107,25 @@ class SolutionCache:
         key = (path, path.stat().st_mtime_ns)
         with self._lock:
             if key not in self._kept:
-                self._kept[key] = read_result(path)
+                solution = read_result(path)
+                known = [] if truth is None else beside_truth(solution, truth)
+                self._kept[key] = Shown(solution, volumes_of(solution) | volumes_beside(known))
                 while len(self._kept) > KEPT:
                     self._kept.popitem(last=False)
             self._kept.move_to_end(key)
             return self._kept[key]
+
+
+def volumes_beside(known: list[Beside]) -> dict[str, Volume]:
+    """Return the truth and the error of every quantity."""
+    found = {}
+    for one in known:
+        truth, error = (np.asarray(values, np.float32) for values in (one.truth, one.error))
+        name = f"{one.name}_truth"
+        found[name] = Volume(name, one.unit, f"true {one.label}", "truth", truth)
+        name = f"{one.name}_error"
+        found[name] = Volume(name, one.unit, f"{one.label}, found minus true", "error", error)
+    return found
 
 
 def cut(values: Float32[np.ndarray, "nx ny nz"], axis: Axis, index: int) -> Float32[np.ndarray, "rows cols"]:

@@ -26,7 +26,10 @@ def report(
 
 def export(
     experiment: Annotated[Path, typer.Argument(help="Experiment folder.")],
-    kind: Annotated[Literal["nc", "vti", "csv"], typer.Option("--format", help="File format.")] = "nc",
+    kind: Annotated[
+        Literal["nc", "h5", "vti", "csv", "zip", "png"],
+        typer.Option("--format", help="File format; zip is an OpenFOAM case."),
+    ] = "nc",
     output: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,
     result: Result = None,
 ) -> None:

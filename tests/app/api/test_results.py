@@ -2,17 +2,21 @@
 
 import dataclasses
 import json
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 from app.api.volumes import pack
 from app.client import Client, ServiceError
-from app.experiment import write_manifest
+from app.experiment import save_settings, write_manifest
 from app.results import write_result
+from app.score import score_experiment
 from core.result import Outcome, Solution
+from core.scene import PointSensors
 from tests.app.api.conftest import Live
 
 AXES = [np.linspace(0.0, size, n) for size, n in ((4.0, 5), (3.0, 6), (2.0, 7))]
@@ -53,7 +57,7 @@ def test_results_are_listed_and_interrupted_ones_are_told_apart(airlens: Client,
 
 def test_a_result_tells_its_grid_fields_and_end(airlens: Client, made: tuple[str, str]):
     result = airlens.result(*made)
-    assert [field.name for field in result.fields] == ["T", "u", "v", "w"]
+    assert [field.name for field in result.fields if field.kind == "found"] == ["T", "u", "v", "w"]
     assert result.fields[0].maximum == float(T.max())
     assert (result.outcome, result.advice, result.notes) == (
         "plateau",
@@ -93,10 +97,47 @@ def test_history_has_null_for_what_is_not_finite(airlens: Client, made: tuple[st
 
 
 def test_exports_are_files_for_other_programs(airlens: Client, made: tuple[str, str], tmp_path: Path):
-    for form in ("nc", "vti", "csv"):
+    for form in ("nc", "h5", "vti", "csv", "zip", "png"):
         file = airlens.export(*made, form, tmp_path / f"result.{form}")
         assert file.stat().st_size > 100
+    with h5py.File(tmp_path / "result.h5") as file:
+        assert np.array_equal(file["T"][...], T)
+    with zipfile.ZipFile(tmp_path / "result.zip") as case:
+        lines = case.read("case/0/T").decode().splitlines()
+        assert "(4 5 6)" in case.read("case/system/blockMeshDict").decode()
+    first = lines.index("(") + 1
+    # x fastest: the second cell is the next one along x.
+    assert float(lines[first + 1]) == pytest.approx(float(T[1:3, :2, :2].mean(dtype=np.float64)), rel=1e-6)
+    assert lines[first + 4 * 5 * 6] == ");"
     assert (tmp_path / "result.csv").read_text().count("\n") == 1 + T.size
+
+
+def test_a_simulated_room_shows_its_truth_and_the_error(airlens: Client, live: Live, made: tuple[str, str]):
+    fields = {field.name: field for field in airlens.result(*made).fields}
+    assert (fields["T_truth"].kind, fields["u_error"].kind) == ("truth", "error")
+    error = airlens.volume(*made, "T") - airlens.volume(*made, "T_truth")
+    assert airlens.volume(*made, "T_error") == pytest.approx(error, abs=1e-4)
+    folder = live.app.state.services.folders.folder(made[0])
+    scores = {one.name: one.value for one in airlens.comparison(*made).scores}
+    assert (
+        scores["T: rms error"]
+        == score_experiment(folder, folder / "truth.npz", folder / "results" / "r1")["T"]["rms_K"]
+    )
+
+
+def test_point_sensors_stand_beside_what_was_found_there(airlens: Client, live: Live, made: tuple[str, str]):
+    experiment = live.app.state.services.folders.open(made[0])
+    (experiment.folder / "sensors.csv").write_text("x,y,z,T,T_std,u\n1,0.6,1,294.5,0.1,\n2,1.2,1,,,0.3\n")
+    scene = experiment.settings.scene
+    known = (*scene.boundary, PointSensors(file="sensors.csv"))
+    changed = experiment.settings.model_copy(update={"scene": dataclasses.replace(scene, boundary=known)})
+    save_settings(experiment.folder, changed)
+    first, second = airlens.comparison(*made).readings
+    save_settings(experiment.folder, experiment.settings)
+    assert (first.name, first.measured, first.std) == ("T", 294.5, 0.1)
+    assert first.found == pytest.approx(float(T[1, 1, 3]), abs=1e-4)
+    assert (second.name, second.position_m) == ("u", [2.0, 1.2, 1.0])
+    assert second.found == pytest.approx(float(U[2, 2, 3, 0]), abs=1e-6)
 
 
 def test_presets_are_listed_with_what_they_are(airlens: Client):

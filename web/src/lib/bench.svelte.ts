@@ -170,6 +170,15 @@ class Bench {
     this.done = `Saved ${link.download}`;
   }
 
+  /** Opens the report in a window of its own; a refusal is shown here, not there. */
+  async report(result: string): Promise<void> {
+    const address = `/api/experiments/${this.experiment}/results/${result}/report`;
+    const answer = await fetch(address);
+    if (!answer.ok) throw new ProblemError((await answer.json()) as Problem);
+    window.open(address, "_blank", "noopener,noreferrer");
+    this.done = "Opened the report";
+  }
+
   private nextStep(): Step {
     const running = this.desk?.state === "running";
     const job = this.active.find((one) => one.experiment === this.experiment);

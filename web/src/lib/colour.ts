@@ -21,7 +21,7 @@ export interface Scale {
 
 /** A scale for values between two bounds: symmetric about zero where the quantity has a sign. */
 export function scaleFor(name: string, low: number, high: number): Scale {
-  const signed = ["u", "v", "w", "p"].includes(name);
+  const signed = /^[uvwp](_truth)?$|_error$|_difference$/.test(name);
   const reach = Math.max(Math.abs(low), Math.abs(high)) || 1;
   return signed ? { low: -reach, high: reach, signed } : { low, high: high > low ? high : low + 1e-6, signed };
 }

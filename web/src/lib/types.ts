@@ -124,6 +124,7 @@ export interface Field {
   name: string;
   unit: string;
   label: string;
+  kind: "found" | "uncertainty" | "truth" | "error";
   minimum: number;
   maximum: number;
   mean: number;
@@ -140,6 +141,11 @@ export interface Result {
   solver_s: number;
   notes: string[];
   manifest: Record<string, unknown>;
+}
+
+export interface Comparison {
+  scores: { name: string; value: number; unit: string }[];
+  readings: { name: string; unit: string; position_m: number[]; measured: number; std: number; found: number }[];
 }
 
 export interface LiveNumbers {

@@ -30,6 +30,7 @@ export interface Modes {
 export interface Scene3d {
   load(values: Numbers, velocity: Numbers[] | null, axes: Grid["axes"], scale: Scale): void;
   show(modes: Modes, level: number): void;
+  picture(): Promise<string>;
   close(): void;
 }
 
@@ -95,12 +96,17 @@ export function createScene(place: HTMLElement): Scene3d {
     place.dataset["frameMs"] = (performance.now() - began_ms).toFixed(1);
   }
 
+  async function picture(): Promise<string> {
+    const [captured] = window3d.captureImages();
+    return (await captured) ?? "";
+  }
+
   function close(): void {
     watch.disconnect();
     view.delete();
   }
 
-  return { load, show, close };
+  return { load, show, picture, close };
 }
 
 function imageOf(values: Numbers, axes: Grid["axes"]) {
