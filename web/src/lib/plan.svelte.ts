@@ -1,0 +1,46 @@
+// The plan of the experiment in use: read when there is one, made by a job of its own.
+import { get, post, ProblemError } from "./api";
+import { bench } from "./bench.svelte";
+import type { Job, Plan, PlannedPreset } from "./types";
+
+class Planned {
+  plan = $state.raw<Plan | null>(null);
+  missing = $state("");
+  job = $derived(bench.jobs.find((one) => one.kind === "plan" && one.experiment === bench.experiment) ?? null);
+  busy = $derived(this.job !== null && ["queued", "running", "lost"].includes(this.job.state));
+
+  async read(experiment: string | null): Promise<void> {
+    if (!experiment) this.plan = null;
+    else
+      try {
+        this.plan = await get<Plan>(`/experiments/${experiment}/plan`);
+        this.missing = "";
+      } catch (error) {
+        if (!(error instanceof ProblemError)) throw error;
+        this.plan = null;
+        this.missing = error.problem.detail;
+      }
+  }
+
+  async make(excess_k: number | null): Promise<void> {
+    await post<Job>("/jobs", {
+      kind: "plan",
+      experiment: bench.experiment,
+      title: `plan: ${bench.current?.title ?? bench.experiment}`,
+      settings: excess_k === null ? {} : { excess_k },
+      key: crypto.randomUUID(),
+    });
+    bench.jobs = await get<Job[]>("/jobs");
+  }
+
+  preset(name: string): PlannedPreset | null {
+    return this.plan?.presets.find((one) => one.preset === name) ?? null;
+  }
+}
+
+export const planned = new Planned();
+
+export function duration(seconds: number): string {
+  if (seconds < 90) return `${Math.max(1, Math.round(seconds))} s`;
+  return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${(seconds / 3600).toFixed(1)} h`;
+}
