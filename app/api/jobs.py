@@ -3,14 +3,21 @@
 from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query
+import numpy as np
+from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
+from app.api.bodies import body
+from app.api.problems import ApiError
 from app.api.services import Given, Services
 from app.api.strict import Identifier, Strict
+from app.api.volumes import pack
 from app.jobs import Job, JobSpec, JobState, kinds
+from app.jobs.folder import JobFolder
+from app.jobs.task import PLANE_FILE
 
 router = APIRouter(tags=["jobs"])
+NUMBERS = body("application/octet-stream", "Little-endian float32 in C order, along x then z.")
 State = Literal["queued", "running", "pausing", "cancelling", "paused", "lost", "done", "failed", "cancelled"]
 
 
@@ -126,6 +133,19 @@ def read_curves(
     given.ledger.get(job)
     step, values = given.curves.read(job, points)
     return Curves(step=step, values=values)
+
+
+@router.get("/jobs/{job}/field", response_class=Response, responses=NUMBERS)
+def read_field(given: Given, job: Identifier) -> Response:
+    """Return the room's middle plane, T - T0 [K] over x and z, as the newest attempt last showed it."""
+    found = given.ledger.get(job)
+    path = JobFolder(given.ledger.folder / found.id).attempt(found.attempt) / PLANE_FILE
+    try:
+        plane = np.load(path, allow_pickle=False)
+    except (FileNotFoundError, ValueError):
+        raise ApiError("not_found", "This job has shown no field yet.", "Look again in a moment.") from None
+    packed = pack(plane, "f32")
+    return Response(packed.content, media_type="application/octet-stream", headers=packed.headers)
 
 
 def resource(job: Job) -> JobResource:

@@ -11,9 +11,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from jaxtyping import Float32
+
 from app.durable import make_folder, publish_folder, write_json
 from app.errors import BadInputError
 from app.jobs.folder import JobFolder, Owner
+
+PLANE_FILE = "plane.npy"
+SHOWN_EVERY_S = 1.0
 
 
 class StoppedError(Exception):
@@ -51,6 +57,14 @@ class Task:
         """Tell how far the computation is, with the values worth a curve."""
         finite = {name: value if math.isfinite(value) else None for name, value in (values or {}).items()}
         self.tell("progress", {"step": step, "steps": steps, **finite})
+
+    def show(self, plane: Float32[np.ndarray, "across up"]) -> None:
+        """Show how a field stands now; at most once a second, and not kept: it is told, not promised."""
+        path = self.folder.attempt(self.owner.attempt) / PLANE_FILE
+        if not path.exists() or time.time() - path.stat().st_mtime >= SHOWN_EVERY_S:
+            temporary = path.with_suffix(".tmp.npy")
+            np.save(temporary, np.asarray(plane, np.float32))
+            temporary.replace(path)
 
     def check_stop(self) -> None:
         """Raise StoppedError when the job was asked to stop. Call it after writing a checkpoint."""

@@ -7,10 +7,12 @@ the march goes back to the last window and halves the Courant number, once.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 from jaxtyping import Array, Bool, Float
 
@@ -66,7 +68,7 @@ def march(
     model: RoomModel,
     settings: MarchSettings,
     *,
-    on_window: Callable[[dict[str, float]], object] | None = None,
+    on_window: Callable[[dict[str, Any]], object] | None = None,
 ) -> March:
     """The steady flow that `flow` settles to."""
     windows: list[Flow] = []
@@ -86,7 +88,9 @@ def march(
         change = float(_relative_change(mean, windows[-1])) if windows else float("inf")
         windows.append(mean)
         if on_window is not None:
-            on_window({"model_s": model_s, "steps": float(steps), "change": change})
+            # The middle of the room as it is now, for somebody to watch it grow.
+            plane = np.asarray(mean.excess_k[:, mean.excess_k.shape[1] // 2], np.float32)
+            on_window({"model_s": model_s, "change": change, "excess_plane_k": plane})
         flow = new
         if change < settings.tolerance:
             outcome = Outcome.converged

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from core.mlp import MlpSettings
 from core.problem import Problem
 from core.result import Solution
@@ -32,7 +34,8 @@ def solve_grid_recipe(
     cells = 32 if chosen == "auto" else chosen
     coarsest = next((n for n in (cells // 4, cells // 2) if n >= 16 and cells % n == 0), cells)
     settings = GridSettings(regime=regime_for(problem), cells=cells, coarsest=coarsest)
-    return solve_grid(problem, settings, on_event=on_event, store=store, should_stop=should_stop)
+    watch = _told(on_event, problem)
+    return solve_grid(problem, settings, on_event=on_event, store=store, should_stop=should_stop, watch=watch)
 
 
 def solve_paper(
@@ -53,4 +56,18 @@ def solve_paper(
         weights=Weights(smoothness=0.0),
         rays="network",
     )
-    return solve_mlp(problem, settings, on_event=on_event, store=store, should_stop=should_stop)
+    watch = _told(on_event, problem)
+    return solve_mlp(problem, settings, on_event=on_event, store=store, should_stop=should_stop, watch=watch)
+
+
+def _told(on_event: OnEvent | None, problem: Problem) -> Callable[[Solution], object] | None:
+    """What tells the temperature's middle plane [x, z], for somebody to watch it grow."""
+    if on_event is None:
+        return None
+    ambient_k = problem.scene.air.ambient_temperature_k
+
+    def tell(solution: Solution) -> None:
+        plane = solution.temperature_k[:, solution.temperature_k.shape[1] // 2] - ambient_k
+        on_event({"kind": "plane", "excess_plane_k": np.asarray(plane, np.float32)})
+
+    return tell

@@ -13,7 +13,7 @@ from tests.browser.conftest import PAGE, Opens, Station, snapshot
 
 ROOT = PAGE.parents[1]
 AXE = ROOT / "node_modules" / "axe-core" / "axe.min.js"
-PAGES = ["Rig", "Calibrate", "Capture", "Reconstruct", "Look"]
+PAGES = ["Rig", "Calibrate", "Plan", "Capture", "Reconstruct", "Look"]
 
 
 def packed_bytes(*patterns: str) -> int:

@@ -4,6 +4,7 @@ The result is made in a hidden folder beside the experiment's results and put in
 A solver that keeps checkpoints goes on from its last one; another starts again.
 """
 
+import itertools
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -46,10 +47,16 @@ def run(task: Task, settings: ReconstructSettings) -> dict[str, Any]:
         task.check_stop()
         task.tell("stage", {"stage": stage})
 
+    told = itertools.count(1)
+
     def on_event(row: Mapping[str, Any]) -> None:
+        if "excess_plane_k" in row:
+            task.show(row["excess_plane_k"])
         numbers = {name: float(value) for name, value in row.items() if isinstance(value, int | float)}
-        step = int(numbers.pop("step", numbers.pop("iteration", 0)))
-        task.progress(step, int(numbers.pop("steps", 0)), numbers)
+        if numbers:
+            # A march has no steps of equal worth: its rows are counted.
+            step = int(numbers.pop("step", numbers.pop("iteration", 0))) or next(told)
+            task.progress(step, int(numbers.pop("steps", 0)), numbers)
 
     done = reconstruct(
         task.experiment_folder(),

@@ -3,7 +3,7 @@
 import { ask, get, openSession, post, ProblemError, type Problem } from "./api";
 import type { Camera, Capture, Desk, Experiment, Job, Projector, ResultLine, ServiceEvent } from "./types";
 
-export const PAGES = ["Rig", "Calibrate", "Capture", "Reconstruct", "Look"] as const;
+export const PAGES = ["Rig", "Calibrate", "Plan", "Capture", "Reconstruct", "Look"] as const;
 export type Page = (typeof PAGES)[number];
 
 const ACTIVE = ["queued", "running", "pausing", "cancelling", "lost"];

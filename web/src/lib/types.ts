@@ -107,6 +107,51 @@ export interface Job {
   finished_s: number | null;
 }
 
+export interface Preset {
+  preset: string;
+  about: string;
+}
+
+export interface PlannedPreset {
+  preset: string;
+  fits: boolean;
+  solver_s: number | null;
+  memory_mb: number | null;
+  temperature_error_k: number | null;
+  velocity_error: number | null;
+  pressure_error: number | null;
+  reason: string;
+}
+
+export interface Plan {
+  expected: string;
+  expected_contrast_k: number;
+  expected_departure_k: number;
+  views: PlannedView[];
+  seen: { modes: number; modes_seen: number; images: number; boundary: number; both: number };
+  choices: { name: string; value: boolean | number | string; reason: string }[];
+  presets: PlannedPreset[];
+  machine: string;
+  verdicts: string[];
+}
+
+export interface PlannedView {
+  name: string;
+  light: string;
+  window_px: number;
+  noise_px: number | null;
+  shift_median_px: number;
+  shift_p99_px: number;
+  signal_to_noise: number;
+  picture_signal_to_noise: number;
+  smallest_visible_k: number | null;
+  frames: number;
+  frames_needed: number | null;
+  other_light: string;
+  other_light_shift_p99_px: number;
+  map: { columns_px: number[]; rows_px: number[]; shift_mpx: (number | null)[][] };
+}
+
 export interface Curves {
   step: number[];
   values: Record<string, (number | null)[]>;
