@@ -22,6 +22,7 @@ from core.displacement import derivative_filter
 from core.fields import GridField
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays import NonlinearTracer
+from core.rays.visibility import sees_wall
 from core.render import PixelGeometry, pixel_geometry, render_reference
 from core.render.shift import wall_offset_m
 from core.scene import PlaneField, Scene
@@ -80,7 +81,9 @@ def _measure(volume: RoomVolume, scene: Scene, window_px: int, seed: int) -> Shi
     # information = L Lᵀ, so L⁻ᵀ times white noise has its inverse as covariance.
     root = np.linalg.cholesky(information)
     drawn = np.linalg.solve(root.transpose(0, 2, 1), noise[..., None])[..., 0]
-    return ShiftMeasurement(centres, exact_px + drawn, information, window_px)
+    # As in a measurement: windows that do not see the patterned wall whole say nothing.
+    seen = sees_wall(scene, 0, centres, margin_px=float(window_px))
+    return ShiftMeasurement(centres[seen], (exact_px + drawn)[seen], information[seen], window_px)
 
 
 def _centres(scene: Scene, window_px: int) -> Float[np.ndarray, "windows 2"]:

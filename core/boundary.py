@@ -36,7 +36,8 @@ def boundary_loss(problem: Problem, frame: Frame, *, weight: float, points_an_ax
     for item in items:
         match item:
             case Wall() if item.wall not in known:
-                patches += _wall(item, [h for h in held if h.wall == item.wall], frame, points_an_axis)
+                own = [h for h in held if h.wall == item.wall]
+                patches += _wall(item, own, frame, points_an_axis, resolved=_resolves_layers(problem))
             case Inlet() | Outlet() | Heater() if item.patch.wall not in known:
                 patches.append(_patch(item, frame, points_an_axis))
             case _:
@@ -81,14 +82,26 @@ def _plane(plane: PlaneData, frame: Frame, n: int) -> Patch:
     return Patch(spans, target, _constant(shape, 1 / largest[0], 1 / largest[1], 1 / largest[2]))
 
 
-def _wall(wall: Wall, held: list[WallPatch], frame: Frame, n: int) -> list[Patch]:
+def _resolves_layers(problem: Problem) -> bool:
+    """Whether the model's transport is the air's own up to the walls.
+
+    With the effective transport of a mean flow the thermal layer at a wall is thinner than a cell: the
+    wall's temperature is not that of the air beside it, and would drag the whole room along.
+    """
+    return problem.scene.flow.transport in ("molecular", "given")
+
+
+def _wall(wall: Wall, held: list[WallPatch], frame: Frame, n: int, *, resolved: bool) -> list[Patch]:
     spans, axes = _wall_spans(wall.wall, frame, n)
     shape = tuple(span[2] for span in spans)
     free = ~np.any([_inside(h, spans, axes, frame) for h in held], axis=0) if held else np.ones(shape, bool)
     kelvin = wall.temperature_k if wall.temperature_k is not None else frame.scales.reference_k
     target = _values(shape, frame, temperature_k=kelvin)
     weight = _masked(
-        free, temperature=float(wall.thermal == "temperature"), pressure=0.0, velocity=float(wall.no_slip)
+        free,
+        temperature=float(resolved and wall.thermal == "temperature"),
+        pressure=0.0,
+        velocity=float(wall.no_slip),
     )
     patches = [Patch(spans, target, weight)]
     if wall.thermal == "adiabatic":

@@ -40,7 +40,7 @@ def regimes(
     information: Annotated[str, typer.Option(help="paper, operator or surveyed.")] = "paper",
     method: Annotated[str, typer.Option(help="grid or mlp.")] = "grid",
     cells: Annotated[int, typer.Option(help="Cells an axis of the grid.")] = 64,
-    network_s: Annotated[float, typer.Option(help="Seconds for the network, for each regime.")] = 120.0,
+    network_steps: Annotated[int, typer.Option(help="Steps of the network, for each regime.")] = 500,
     width: Annotated[int, typer.Option(help="Width of the network's four layers.")] = 128,
     batch: Annotated[int, typer.Option(help="Collocation points a step; the paper's is 8192.")] = 8192,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON line a regime.")] = False,
@@ -53,7 +53,7 @@ def regimes(
     found: dict[Regime, Solution] = {}
     for regime in REGIMES:
         began = time.process_time()
-        found[regime] = _solve(problem, regime, method, cells, MlpSettings(width=width), batch, network_s)
+        found[regime] = _solve(problem, regime, method, cells, MlpSettings(width=width), batch, network_steps)
         cpu_s = round(time.process_time() - began, 1)
         point = {"setup": setup, "information": information, "method": method, "regime": regime}
         cost = {"solver_s": round(found[regime].solver_s, 1), "cpu_s_with_compilation": cpu_s}
@@ -85,7 +85,7 @@ def _solve(
     cells: int,
     network: MlpSettings,
     batch: int,
-    network_s: float,
+    network_steps: int,
 ) -> Solution:
     if method == "grid":
         return solve_grid(problem, GridSettings(regime=regime, cells=cells, coarsest=min(cells, 16)))
@@ -96,7 +96,7 @@ def _solve(
         collocation_points=batch,
         pixels=round(5000 * share),
         boundary_points=round(4096 * share),
-        loop=LoopSettings(time_limit_s=network_s),
+        loop=LoopSettings(steps=network_steps),
     )
     return solve_mlp(problem, settings)
 

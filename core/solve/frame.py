@@ -9,7 +9,7 @@ from core.boussinesq import Flow, Numbers, Scales, scales
 from core.geometry import Box
 from core.problem import Problem
 from core.representation import Spans, positions
-from core.scene import FlowModel, Heater, Inlet, Wall
+from core.scene import FlowModel, Heater, Inlet, Outlet, Wall
 from core.setting import SettingError
 
 # ν_eff = U L / Re of the mean flow where nothing is given. Two RANS rooms (warm jets, 0.3 and 0.5 m/s,
@@ -62,16 +62,26 @@ def frame_of(problem: Problem) -> Frame:
 
 
 def height_profile(problem: Problem, frame: Frame, spans: Spans) -> Flow:
-    """Median over y of T and p on a known plane across x or y, carried through the room; zero without one."""
+    """Median over y of T and p on a known plane across x or y, carried through the room.
+
+    Without a plane the temperature of the air that leaves, where an outlet knows it; else zero.
+    """
     shape = tuple(span[2] for span in spans)
     temperature = np.zeros(shape, np.float32)
     pressure = np.zeros(shape, np.float32)
+    leaving = [
+        item.mean_temperature_k
+        for item in problem.scene.boundary
+        if isinstance(item, Outlet) and item.mean_temperature_k is not None
+    ]
+    if leaving:
+        temperature += (np.mean(leaving) - frame.scales.reference_k) / frame.scales.excess_k
     upright = [plane for plane in problem.planes if plane.wall[0] in "xy"]
     if upright:
         plane, scales = upright[0], frame.scales
         z_m = frame.room.lower_m[2] + scales.length_m * positions(spans[2])
         excess = np.median(plane.temperature_k, axis=0) - scales.reference_k
-        temperature += np.interp(z_m, plane.second_m, excess / scales.excess_k)
+        temperature[...] = np.interp(z_m, plane.second_m, excess / scales.excess_k)
         pressure += (
             np.interp(z_m, plane.second_m, np.median(plane.pressure_m2_s2, axis=0)) / scales.pressure_m2_s2
         )

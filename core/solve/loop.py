@@ -116,7 +116,7 @@ def run(
         )
     keeper = _Keeper(store, settings, configuration)
     began = time.perf_counter()
-    outcome, slow = None, False
+    outcome, slow = None, True
     while outcome is None:
         started = time.perf_counter()
         following, parts = step(state, data)

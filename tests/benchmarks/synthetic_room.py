@@ -162,6 +162,7 @@ def main() -> None:
     parser.add_argument("--march-steps", type=int, default=8000)
     parser.add_argument("--coarsest", type=int, default=16)
     parser.add_argument("--steps", type=int, default=3)
+    parser.add_argument("--cg-iterations", type=int, default=60)
     options = parser.parse_args()
     problem, truth, grid = synthetic_problem(options.cells, options.reynolds, options.march_steps)
     left = discrete_residuals(truth, grid, frame_of(problem).numbers)
@@ -169,13 +170,15 @@ def main() -> None:
         cells=options.cells,
         coarsest=options.coarsest,
         steps_a_level=options.steps,
+        cg_iterations=options.cg_iterations,
         data=DataModel(representation=0.0),
     )
     for kind in ("first, with compilation", "second"):
         began = time.process_time()
         found = solve_grid(problem, settings)
         cpu_s = time.process_time() - began
-        line = {"run": kind, "cells": options.cells, "cpu_s": round(cpu_s, 2), "outcome": found.outcome.name}
+        line = {"run": kind, "cells": options.cells, "cpu_s": round(cpu_s, 2)}
+        line |= {"solver_s": round(found.solver_s, 2), "outcome": found.outcome.name}
         line |= {k: round(v, 5) for k, v in errors(found, truth, grid, frame_of(problem)).items()}
         line["truth_residual"] = float(
             max(jnp.abs(a).max() for a in jax.tree.leaves(eqx.filter(left, eqx.is_array)))

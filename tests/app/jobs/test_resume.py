@@ -1,0 +1,86 @@
+"""Killed in the middle and started again: the end is bitwise the same. Real processes, the preset `grid`."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from app.cli import create_cli
+from app.jobs import JobSpec, Ledger
+from app.jobs.folder import JobFolder, Owner
+from app.jobs.worker_status import DONE
+from app.results import read_result
+from core.solve.checkpoint import decode
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="module")
+def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("rig") / "experiment"
+    with (files("app.sample") / "room.npz").open() as truth:
+        options = ["--truth", truth.name, "--camera-px", "160", "--frames", "2"]
+    CliRunner().invoke(create_cli(), ["simulate", str(folder), *options], catch_exceptions=False)
+    settings = folder / "experiment.toml"
+    text = settings.read_text()
+    assert text.count('grid = "auto"') == 1
+    settings.write_text(text.replace('grid = "auto"', "grid = 8"))
+    return folder
+
+
+class Attempts:
+    """One job, run by a new process each time."""
+
+    def __init__(self, folder: Path, experiment: Path, cache: Path) -> None:
+        ledger = Ledger(folder)
+        job = ledger.submit(JobSpec(kind="reconstruct", experiment=experiment, settings={"preset": "grid"}))
+        self.folder, self.number = JobFolder(ledger.folder_of(job.id)), 0
+        # What one process compiled the next ones need not.
+        own = {"JAX_COMPILATION_CACHE_DIR": str(cache), "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}
+        self._environment = {**os.environ, **own}
+
+    def begin(self) -> subprocess.Popen:
+        self.number += 1
+        self.folder.hand_over(Owner(self.number, f"attempt {self.number}"))
+        command = [sys.executable, "-m", "app.worker", str(self.folder.path)]
+        return subprocess.Popen(command, cwd=ROOT, env=self._environment)
+
+    def kept(self) -> list[Path]:
+        return sorted(self.folder.attempt(self.number).glob("checkpoint/*.checkpoint"))
+
+    def wait_for_a_checkpoint(self, process: subprocess.Popen) -> None:
+        deadline = time.monotonic() + 200
+        while not self.kept() and process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.001)
+
+    def result(self) -> bytes:
+        found = read_result(self.folder.target() / "result.nc")
+        assert found.velocity_m_s is not None
+        return found.temperature_k.tobytes() + found.velocity_m_s.tobytes()
+
+
+def test_kill_9_in_the_middle_and_again_ends_bitwise_the_same(experiment: Path, tmp_path: Path):
+    job = Attempts(tmp_path / "killed", experiment, tmp_path / "cache")
+    with job.begin() as process:
+        job.wait_for_a_checkpoint(process)
+        process.send_signal(signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL
+    assert not job.folder.is_published()
+    taken = decode(job.kept()[-1].read_bytes()).header["step"]
+    assert taken >= 1
+
+    with job.begin() as process:
+        process.wait(200)
+    assert process.returncode == DONE
+
+    whole = Attempts(tmp_path / "whole", experiment, tmp_path / "cache")
+    with whole.begin() as process:
+        process.wait(200)
+    assert process.returncode == DONE
+    assert job.result() == whole.result()
