@@ -4,8 +4,10 @@ from pathlib import Path
 
 from app.capture import CaptureRecorder
 from app.capture_room import check_room
+from app.conditions import UNTOLD, Conditions, seconds_on
 from app.errors import AirlensError
 from app.experiment import Experiment, new_id
+from app.judge import judged, noted
 from app.rig import AirState, open_camera
 from drivers.burst import BurstOutcome, CapturePlan
 from drivers.capture import Abort, OnProgress, run_capture
@@ -18,6 +20,7 @@ def acquire(
     abort: Abort | None = None,
     *,
     air: AirState | None = None,
+    told: Conditions = UNTOLD,
 ) -> Path:
     """Run `plan` and return the capture's folder, finished.
 
@@ -29,8 +32,17 @@ def acquire(
         check_room(experiment.folder, plan, camera.info)
         folder = experiment.captures_folder / new_id(experiment.captures_folder, plan.kind)
         recorder = CaptureRecorder(folder, plan)
-        burst = run_capture(camera, plan, on_progress, on_frame=recorder.observe, abort=abort)
-        recorder.keep(burst, origin={"rig": experiment.settings.rig.camera.kind, "air": state})
+        burst = run_capture(
+            camera,
+            plan,
+            on_progress,
+            on_frame=recorder.observe,
+            abort=abort,
+            rig_on_s=seconds_on(experiment.settings, told),
+        )
+        burst = judged(experiment, burst, told)
+        origin = {"rig": experiment.settings.rig.camera.kind, "air": state} | noted(experiment, told)
+        recorder.keep(burst, origin=origin)
     if burst.outcome is not BurstOutcome.COMPLETE:
         raise AirlensError(
             f"The {plan.kind} capture ended early ({burst.outcome.value}) after {burst.frames} of "

@@ -3,6 +3,7 @@
 boards -> camera        sequences -> projector        wall sequence or board on the wall -> wall
 """
 
+import functools
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -130,7 +131,7 @@ def calibrate_wall(
         raise BadInputError(
             "Nothing shows the wall; give --images, a Gray-code sequence on it, or --level-image."
         )
-    return _build(calibration, record, issues)
+    return built(calibration, record, issues)
 
 
 def _finish(
@@ -158,7 +159,7 @@ def _finish(
             kept[board.sha256] = board
     record = old or Record(camera, size)
     record = _merged(record, tuple(kept.values()), panel_px)
-    return _build(calibration, record, issues)
+    return built(calibration, record, issues)
 
 
 def _merged(record: Record, boards: tuple[SeenBoard, ...], panel_px: tuple[int, int] | None) -> Record:
@@ -168,10 +169,17 @@ def _merged(record: Record, boards: tuple[SeenBoard, ...], panel_px: tuple[int, 
     return replace(record.with_boards(boards), panel_size_px=panel_px or record.panel_size_px)
 
 
-def _build(calibration: CalibrationFolder, record: Record, issues: list[str]) -> Step:
+@functools.lru_cache(maxsize=2)
+def model_of(record: Record) -> Model:
+    """The models of a record; the newest ones are remembered. Raises CalibrationError."""
+    return build(record)
+
+
+def built(calibration: CalibrationFolder, record: Record, issues: list[str]) -> Step:
+    """Keep the record, and the models as far as it allows; too few views yet are an issue, not an error."""
     calibration.save_record(record)
     try:
-        model = build(record)
+        model = model_of(record)
     except CalibrationError as error:
         return Step(None, record, (*issues, str(error)))
     calibration.save_model(model)

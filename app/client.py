@@ -21,6 +21,7 @@ from app.api.captures import CaptureResource, DeskResource, Role
 from app.api.devices import CameraResource
 from app.api.events import EventResource
 from app.api.experiments import ExperimentLine, ExperimentResource
+from app.api.guide import GuideResource, StepText
 from app.api.jobs import Curves, JobResource
 from app.api.problems import MEDIA_TYPE, Problem
 from app.api.projector import ProjectorResource, WireLine
@@ -197,6 +198,30 @@ class Client:
     def plan(self, experiment: str) -> Plan:
         """Return the newest plan; a job of kind `plan` makes one."""
         return self._ask(Plan, "GET", f"/experiments/{experiment}/plan")
+    def guide(self, experiment: str, step: StepText = "camera") -> GuideResource:
+        """Return what a guided calibration wants next, and how good it is."""
+        path = f"/experiments/{experiment}/calibration/guide"
+        return self._ask(GuideResource, "GET", path, query={"step": step})
+
+    def take_guided(self, experiment: str, step: StepText = "camera", **how: Any) -> GuideResource:
+        """Take the pictures of what is wanted; `how` are the fields of GuideRequest."""
+        path = f"/experiments/{experiment}/calibration/guide"
+        return self._ask(GuideResource, "POST", path, {"step": step, **how})
+
+    def skip_guided(self, experiment: str, step: StepText = "camera") -> GuideResource:
+        """Do without what is wanted."""
+        path = f"/experiments/{experiment}/calibration/guide/skip"
+        return self._ask(GuideResource, "POST", path, {"step": step})
+
+    def stop_guided(self, experiment: str, step: StepText = "camera") -> GuideResource:
+        """Stop taking pictures; those taken are kept."""
+        path = f"/experiments/{experiment}/calibration/guide/stop"
+        return self._ask(GuideResource, "POST", path, query={"step": step})
+
+    def retake_view(self, experiment: str, view: str, step: StepText = "camera") -> GuideResource:
+        """Forget a view, so that it is asked for again."""
+        path = f"/experiments/{experiment}/calibration/views/{view}"
+        return self._ask(GuideResource, "DELETE", path, query={"step": step})
 
     def captures(self, experiment: str) -> list[CaptureResource]:
         """List the captures of an experiment."""

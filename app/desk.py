@@ -9,13 +9,14 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from pathlib import Path
 from typing import Any
 
 from app.capture import CaptureRecorder
 from app.capture_room import check_room
+from app.conditions import UNTOLD, seconds_on
 from app.errors import AirlensError
 from app.experiment import Experiment, new_id
+from app.judge import judged, noted
 from app.live import LiveCamera
 from app.rig import AirState, open_camera
 from drivers.burst import BurstOutcome, CapturePlan, Progress
@@ -111,7 +112,7 @@ class CaptureDesk:
             self._connect(experiment, "moving" if plan.kind == "flow" else "still")
             with self._live.using() as camera:
                 check_room(experiment.folder, plan, camera.info)
-                state, reason = self._take(camera, experiment.captures_folder / name, plan)
+                state, reason = self._take(camera, experiment, name, plan)
         except (AirlensError, DeviceError, OSError) as error:
             self._change(replace(self._status, state=DeskState.failed, reason=str(error)))
             return
@@ -128,22 +129,31 @@ class CaptureDesk:
         ):
             self._live.open(source, lambda: open_camera(experiment, air), air)
 
-    def _take(self, camera: Camera, folder: Path, plan: CapturePlan) -> tuple[DeskState, str]:
-        recorder = CaptureRecorder(folder, plan)
+    def _take(
+        self, camera: Camera, experiment: Experiment, name: str, plan: CapturePlan
+    ) -> tuple[DeskState, str]:
+        recorder = CaptureRecorder(experiment.captures_folder / name, plan)
 
         def follow(taken: Taken) -> None:
             recorder.observe(taken)
             self._live.show(taken.frame)
 
         try:
-            burst = run_capture(camera, plan, self._progress, on_frame=follow, abort=self._abort.is_set)
+            burst = run_capture(
+                camera,
+                plan,
+                self._progress,
+                on_frame=follow,
+                abort=self._abort.is_set,
+                rig_on_s=seconds_on(experiment.settings, UNTOLD),
+            )
         except BaseException:
             recorder.discard()
             raise
         if self._abort.is_set() and self._discard:
             recorder.discard()
             return DeskState.aborted, "Discarded, as asked."
-        recorder.keep(burst, origin={"taken_by": "service"})
+        recorder.keep(judged(experiment, burst), origin={"taken_by": "service"} | noted(experiment, UNTOLD))
         if burst.outcome is BurstOutcome.COMPLETE:
             return DeskState.finished, ""
         kept = f"{burst.frames} of {plan.frames} frames are kept as an incomplete capture."

@@ -13,6 +13,7 @@ from app.check import rendered_agreement
 from app.configuration import to_plain
 from app.durable import write_text
 from app.experiment import Experiment, new_id, open_experiment, write_manifest
+from app.judge import aged
 from app.measure import Measurement, measure, with_calibration
 from app.presets import preset as preset_called
 from app.presets import resolved, solve_with
@@ -68,7 +69,7 @@ def reconstruct(
     on_stage(f"solve ({preset})")
     solution = solve_with(solve, measurement.problem, on_event=on_event, store=store, should_stop=should_stop)
     on_stage("keep the result")
-    assumed = (calibrated, *measurement.notes, checked, *solution.notes)
+    assumed = (calibrated, *aged(experiment), *measurement.notes, checked, *solution.notes)
     result = into or _new_folder(experiment, preset)
     _keep(result, experiment, preset, measurement, solution, assumed, time.perf_counter() - started)
     on_stage("report")

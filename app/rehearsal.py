@@ -8,7 +8,7 @@ from typing import Literal
 
 from app.durable import write_durably, write_text
 from app.experiment import Experiment, ExperimentSettings, create_experiment, new_id
-from app.rig_settings import ProjectorSettings, RigSettings, SimulatedCameraSettings
+from app.rig_settings import BoardSettings, ProjectorSettings, RigSettings, SimulatedCameraSettings
 from app.room_scene import Information, RigOptions, room_scene, write_plane
 from app.simulate import TRUTH_FILE
 from app.truth import read_volume
@@ -18,6 +18,9 @@ from core.scene import PlaneField, ProjectedPattern
 # Fast enough to practise with; a real lamp takes longer, and its lamp guard is the real one.
 TWIN = ProjectorSettings(url="simulated:?warm_up_s=8&cool_down_s=6")
 SAMPLE_ROOM = Path(__file__).resolve().parent / "sample" / "room.npz"
+
+# Large, for it is shown some twenty metres away.
+_BOARD = BoardSettings(columns=9, rows=6, square_m=0.1)
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,7 @@ def rehearse(root: Path, wanted: Rehearsal) -> Experiment:
         rig=RigSettings(
             camera=SimulatedCameraSettings(drift_px=0.1),
             projector=TWIN if wanted.light == "projector" else None,
+            board=_BOARD,
         ),
         scene=scene,
     )

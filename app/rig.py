@@ -8,23 +8,27 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 from jaxtyping import Float32
 
+from app.calibration_stage import RealStage, Stage, Task
 from app.cameras import open_v4l2
 from app.errors import BadInputError
 from app.experiment import Experiment
+from app.practice_room import PracticeRoom
 from app.projectors import open_real_projector
 from app.rig_settings import SimulatedCameraSettings
 from app.room_scene import FINEST_PX
 from app.truth import RoomVolume, read_volume
+from calibration.board import Board
 from core.fields import GridField
 from core.geometry import Box, Optics, crop, rotation_matrix, rotation_vector
 from core.render import render_flow, render_reference
-from core.scene import FixedTexture, Scene, WaveletPattern
+from core.scene import FixedTexture, ProjectedPattern, Scene, WaveletPattern
 from drivers.clock import SystemClock
+from drivers.display import PatternDisplay, Picture
 from drivers.projector.escvp21 import EscVp21
 from drivers.projector.link import ProjectorLink
 from drivers.projector.protocol import Projector
 from drivers.protocols import Camera
-from drivers.simulated import SensorNoise, SimulatedCamera
+from drivers.simulated import SensorNoise, SimulatedCamera, SimulatedDisplay
 from drivers.simulated.projector.engine import SimulatedProjector
 from drivers.simulated.projector.escvp21 import EscVp21Twin
 from drivers.simulated.projector.hosts import LoopPort
@@ -68,15 +72,82 @@ def _twin(url: str) -> Projector:
     return ProjectorLink(EscVp21(), LoopPort(SimulatedProjector(EscVp21Twin(state))))
 
 
+def open_stage(
+    experiment: Experiment, board: Board | None, display: PatternDisplay | None = None, view: int = 0
+) -> Stage:
+    """Open the experiment's rig for calibration; a real projector's screen is given as `display`."""
+    settings, scene = experiment.settings.rig.camera, experiment.settings.scene
+    if isinstance(settings, SimulatedCameraSettings):
+        return PracticeStage(scene, settings, board, view)
+    return RealStage(open_v4l2(settings), display, panel_of(scene))
+
+
+def panel_of(scene: Scene) -> tuple[int, int] | None:
+    """Native width and height of the scene's projector; None for a fixed texture."""
+    light = scene.light
+    return (
+        (light.projector.width_px, light.projector.height_px) if isinstance(light, ProjectedPattern) else None
+    )
+
+
+class PracticeStage:
+    """A simulated rig whose boards, wall and light arrange themselves: see `app.calibration_stage.Stage`."""
+
+    arranges_itself = True
+
+    def __init__(
+        self, scene: Scene, settings: SimulatedCameraSettings, board: Board | None, view: int
+    ) -> None:
+        self._room = PracticeRoom(scene, view, board)
+        self.panel_px = panel_of(scene)
+        light = scene.light
+        panel = light.projector if isinstance(light, ProjectedPattern) else None
+        self.display = None if panel is None else _PracticeDisplay(panel, self._room.show)
+        self.camera = SimulatedCamera(
+            self._room,
+            seed=2 * settings.seed,
+            noise=_sensor(scene, settings, view),
+            exposure_s=settings.exposure_s,
+            name=f"simulated {scene.views[view].name}",
+        )
+
+    def arrange(self, task: Task) -> None:
+        """Move the board, cover the lens."""
+        self._room.arrange(task)
+
+
+class _PracticeDisplay:
+    """A simulated screen that lights the simulated room."""
+
+    def __init__(self, panel: Optics, light: Callable[[Picture], None]) -> None:
+        self._screen = SimulatedDisplay(panel.height_px, panel.width_px)
+        self._light = light
+
+    def show(self, picture: Picture) -> str:
+        digest = self._screen.show(picture)
+        self._light(picture)
+        return digest
+
+    def is_showing(self, digest: str) -> bool:
+        return self._screen.is_showing(digest)
+
+    def close(self) -> None:
+        self._screen.close()
+
+
+def _sensor(scene: Scene, settings: SimulatedCameraSettings, view: int) -> SensorNoise:
+    if settings.noise_free:
+        # So many photons that shot noise is 1e-6, and the finest digits there are.
+        return SensorNoise(1e12, 0.0, 64.0, 16)
+    noise = scene.views[view].noise
+    return SensorNoise(noise.full_well_e, noise.read_noise_e, noise.dark_counts, noise.bits)
+
+
 def _simulated_camera(
     experiment: Experiment, settings: SimulatedCameraSettings, air: AirState, view: int
 ) -> SimulatedCamera:
     scene = experiment.settings.scene
-    noise = scene.views[view].noise
-    sensor = SensorNoise(noise.full_well_e, noise.read_noise_e, noise.dark_counts, noise.bits)
-    if settings.noise_free:
-        # So many photons that shot noise is 1e-6, and the finest digits there are.
-        sensor = SensorNoise(1e12, 0.0, 64.0, 16)
+    sensor = _sensor(scene, settings, view)
     if air == "moving":
         scene = drifted(scene, view, settings.drift_px, settings.seed)
     image = _memo(lambda: _render(experiment, settings, scene, air, view))

@@ -5,6 +5,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.configuration import Strict
+from app.errors import BadInputError
+from calibration.board import Board, CharucoBoard, Chessboard, CircleGrid
+from calibration.errors import CalibrationError
 
 
 class SimulatedCameraSettings(Strict):
@@ -34,6 +37,30 @@ class V4l2CameraSettings(Strict):
 CameraSettings = Annotated[SimulatedCameraSettings | V4l2CameraSettings, Field(discriminator="kind")]
 
 
+class BoardSettings(Strict):
+    """The board that the rig is calibrated with: inner corners (chessboard), squares (ChArUco) or circles."""
+
+    kind: Literal["chessboard", "charuco", "circles", "asymmetric-circles"] = "chessboard"
+    columns: Annotated[int, Field(ge=2, le=200)]
+    rows: Annotated[int, Field(ge=2, le=200)]
+    square_m: Annotated[float, Field(gt=0, le=10)]
+    marker_m: Annotated[float | None, Field(gt=0, le=10)] = None
+    dictionary: str = "DICT_5X5_250"
+
+    def board(self) -> Board:
+        """The board. Raises BadInputError for a combination that cannot be."""
+        try:
+            if self.kind == "chessboard":
+                return Chessboard(self.columns, self.rows, self.square_m)
+            if self.kind == "charuco":
+                marker_m = self.marker_m or 0.75 * self.square_m
+                return CharucoBoard(self.columns, self.rows, self.square_m, marker_m, self.dictionary)
+            asymmetric = self.kind == "asymmetric-circles"
+            return CircleGrid(self.columns, self.rows, self.square_m, asymmetric)
+        except CalibrationError as error:
+            raise BadInputError(str(error)) from error
+
+
 class ProjectorSettings(Strict):
     """How the projector is spoken to: `airlens projector` takes the same address; `simulated:` is a twin."""
 
@@ -41,7 +68,8 @@ class ProjectorSettings(Strict):
 
 
 class RigSettings(Strict):
-    """The devices of the rig."""
+    """The devices of the rig, and the board that it is calibrated with."""
 
     camera: CameraSettings = SimulatedCameraSettings()
     projector: ProjectorSettings | None = None
+    board: BoardSettings | None = None

@@ -10,7 +10,9 @@ from typing import Literal
 
 from app.capture import CaptureRecorder
 from app.capture_room import check_room
+from app.conditions import UNTOLD, Conditions, seconds_on
 from app.experiment import Experiment, new_id
+from app.judge import judged, noted
 from drivers.burst import Burst, BurstOutcome, CapturePlan
 from drivers.capture import Abort, OnProgress, run_capture
 from drivers.protocols import Camera
@@ -35,10 +37,11 @@ def take(
     *,
     abort: Abort | None = None,
     on_abort: OnAbort = "keep",
-    rig_on_s: float | None = None,
+    told: Conditions = UNTOLD,
     start: BurstStart | None = None,
 ) -> TakenBurst:
     """Take one burst into a new capture folder. Raises AirlensError without room for it, DeviceError."""
+    rig_on_s = seconds_on(experiment.settings, told)
     check_room(experiment.folder, plan, camera.info)
     folder = experiment.captures_folder / new_id(experiment.captures_folder, plan.kind)
     recorder = CaptureRecorder(folder, plan)
@@ -46,7 +49,9 @@ def take(
     if burst.outcome is BurstOutcome.ABORTED and on_abort == "discard":
         recorder.discard()
         return TakenBurst(burst, None)
-    origin = {"rig": experiment.settings.rig.camera.kind} | ({"sequence": asdict(start)} if start else {})
+    burst = judged(experiment, burst, told)
+    origin = {"rig": experiment.settings.rig.camera.kind} | noted(experiment, told)
+    origin |= {"sequence": asdict(start)} if start else {}
     return TakenBurst(burst, recorder.keep(burst, origin))
 
 
@@ -59,13 +64,15 @@ def take_sequence(
     *,
     abort: Abort | None = None,
     on_abort: OnAbort = "keep",
+    told: Conditions = UNTOLD,
 ) -> list[TakenBurst]:
     """Take a burst at each of the times. Raises DeviceSettingError for times that cannot be kept."""
     check_times(starts_s, plan.frames / camera.info.frame_rate_hz)
     taken: list[TakenBurst] = []
 
     def one(start: BurstStart) -> Burst:
-        taken.append(take(camera, experiment, plan, on_progress, abort=abort, on_abort=on_abort, start=start))
+        options = {"abort": abort, "on_abort": on_abort, "told": told, "start": start}
+        taken.append(take(camera, experiment, plan, on_progress, **options))
         return taken[-1].burst
 
     run_sequence(starts_s, one, abort=abort)

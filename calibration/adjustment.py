@@ -109,7 +109,7 @@ def adjust(
     while iterations < max_iterations and not converged:
         iterations += 1
         trial = here.unknowns.copy()
-        trial[free] += _step(here.normal[np.ix_(free, free)], here.gradient[free], damping)
+        trial[free] += _step(here.normal[np.ix_(free, free)], here.gradient[free], damping, len(poses))
         # The start point may be poor: a focal length must not cross zero on the way.
         usable = all(d.intrinsics[:2].min() > 0 for d in _unpack(trial, devices)[0])
         there = _linearise(trial, devices, sightings) if usable else None
@@ -160,11 +160,34 @@ def _stack(composed: tuple, rr: int, rt: int, tr: int, tt: int) -> np.ndarray:
     return np.block([[composed[rr], composed[rt]], [composed[tr], composed[tt]]])
 
 
-def _step(normal: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:
-    scale = np.sqrt(np.diag(normal))
-    scale[scale == 0] = 1.0
+def _step(normal: np.ndarray, gradient: np.ndarray, damping: float, boards: int) -> np.ndarray:
+    """Solve the damped normal equations: the devices first, then each board's pose by itself."""
+    scale = _scale(normal)
     scaled = normal / np.outer(scale, scale) + damping * np.eye(len(scale))
-    return -np.linalg.solve(scaled, gradient / scale) / scale
+    right = -gradient / scale
+    reduced, across, blocks = _schur(scaled, boards)
+    own = len(reduced)
+    eliminated = np.linalg.solve(blocks, right[own:].reshape(boards, 6, 1))
+    step = np.linalg.solve(reduced, right[:own] - across @ eliminated.ravel())
+    rest = np.linalg.solve(blocks, (right[own:] - across.T @ step).reshape(boards, 6, 1))
+    return np.concatenate([step, rest.ravel()]) / scale
+
+
+def _schur(normal: np.ndarray, boards: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The devices' normal matrix with the poses eliminated, the block beside it, and the poses' own blocks.
+
+    No two boards share a residual, so their part of the matrix is one 6 x 6 block a board.
+    """
+    own = len(normal) - 6 * boards
+    across, each = normal[:own, own:], np.arange(boards)
+    blocks = normal[own:, own:].reshape(boards, 6, boards, 6)[each, :, each, :]
+    carried = np.linalg.solve(blocks, across.T.reshape(boards, 6, own))
+    return normal[:own, :own] - across @ carried.reshape(6 * boards, own), across, blocks
+
+
+def _scale(normal: np.ndarray) -> np.ndarray:
+    scale = np.sqrt(np.diag(normal))
+    return np.where(scale == 0, 1.0, scale)
 
 
 def _result(
@@ -178,16 +201,20 @@ def _result(
     now, poses = _unpack(point.unknowns, devices)
     size = _offset(len(devices))
     normal = point.normal[np.ix_(free, free)]
-    scale = np.sqrt(np.diag(normal))
-    scale[scale == 0] = 1.0
-    inverse = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-14) / np.outer(scale, scale)
+    scale = _scale(normal)
+    # A hair on the diagonal, for boards whose pose a wild start has left undetermined.
+    scaled = normal / np.outer(scale, scale) + 1e-14 * np.eye(len(scale))
+    reduced = _schur(scaled, len(poses))[0]
+    own = free[:size]
+    of_devices = scale[: len(reduced)]
+    inverse = np.linalg.pinv(reduced, rcond=1e-14) / np.outer(of_devices, of_devices)
     degrees = max(sum(len(r) for r in point.residuals) - int(free.sum()), 1)
-    whole = np.zeros_like(point.normal)
-    whole[np.ix_(free, free)] = point.cost / degrees * inverse
+    covariance = np.zeros((size, size))
+    covariance[np.ix_(own, own)] = point.cost / degrees * inverse
     pieces = tuple(
         r.reshape(-1, 2) * now[s.device].sigma_px for r, s in zip(point.residuals, sightings, strict=True)
     )
-    return Adjusted(now, poses, pieces, whole[:size, :size], iterations, converged)
+    return Adjusted(now, poses, pieces, covariance, iterations, converged)
 
 
 def _offset(device: int) -> int:

@@ -30,7 +30,9 @@ def guess_intrinsics(
             focal = ratio * max(width, height)
             centre = ((width - 1) / 2, (height - 1) / 2 + offset * height)
             guess = np.array([focal, focal, *centre, 0, 0, 0, 0, 0], float)
-            error = sum(_pose_and_error(p, q, guess)[1] for p, q in zip(points_m, pixels_px, strict=True))
+            error = sum(
+                guess_pose_and_error(p, q, guess)[1] for p, q in zip(points_m, pixels_px, strict=True)
+            )
             if error < best_error:
                 best, best_error = guess, error
     return best
@@ -42,13 +44,13 @@ def guess_pose(
     intrinsics: Float[np.ndarray, "9"],
 ) -> Pose:
     """The board's pose in the device's frame."""
-    return _pose_and_error(points_m, pixels_px, intrinsics)[0]
+    return guess_pose_and_error(points_m, pixels_px, intrinsics)[0]
 
 
-def _pose_and_error(
+def guess_pose_and_error(
     points_m: np.ndarray, pixels_px: np.ndarray, intrinsics: np.ndarray
 ) -> tuple[Pose, float]:
-    """IPPE for planes, then refined; and the sum of squared residuals."""
+    """The board's pose by IPPE for planes, then refined; and the sum of its squared residuals [px^2]."""
     fx, fy, cx, cy = intrinsics[:4]
     matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     _, rotation, translation = cv2.solvePnP(

@@ -13,6 +13,7 @@ from app.api import (
     devices,
     events,
     experiments,
+    guide,
     jobs,
     plans,
     projector,
@@ -40,6 +41,7 @@ RESOURCES: tuple[APIRouter, ...] = (
     shift.router,
     experiments.router,
     calibrations.router,
+    guide.router,
     captures.router,
     plans.router,
     results.router,
@@ -57,6 +59,7 @@ def create_app(config: ServiceConfig) -> FastAPI:
     @contextlib.asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         yield
+        services.guide.close()
         services.desk.close()
         services.camera.close()
         services.projector.close()

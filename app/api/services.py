@@ -12,6 +12,7 @@ from app.api.feed import EventFeed
 from app.api.folders import Folders
 from app.api.settings import ServiceConfig
 from app.api.volumes import SolutionCache
+from app.calibration_desk import CalibrationDesk
 from app.desk import CaptureDesk
 from app.jobs import Ledger
 from app.kiosk_screen import KioskScreen
@@ -34,6 +35,7 @@ class Services:
     solutions: SolutionCache
     camera: LiveCamera
     desk: CaptureDesk
+    guide: CalibrationDesk
     screen: KioskScreen
     projector: LiveProjector
 
@@ -51,6 +53,7 @@ def create_services(config: ServiceConfig) -> Services:
     ledger = Ledger(config.jobs_folder)
     camera = LiveCamera(ledger.append_event)
     projector = LiveProjector(ledger.append_event)
+    screen = KioskScreen()
     return Services(
         config,
         Access(config),
@@ -62,7 +65,8 @@ def create_services(config: ServiceConfig) -> Services:
         SolutionCache(),
         camera,
         CaptureDesk(camera, ledger.append_event),
-        KioskScreen(),
+        CalibrationDesk(camera, screen, ledger.append_event),
+        screen,
         projector,
     )
 

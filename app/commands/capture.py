@@ -38,12 +38,16 @@ def _command(kind: CaptureKind):
         settle: Annotated[float, typer.Option(min=0.0, help="Wait so many seconds first.")] = 0.0,
         refresh_hz: Annotated[float | None, typer.Option(help="Projector's refresh rate in Hz.")] = None,
         rig_on: Annotated[float | None, typer.Option(help="How long the rig has been on, in s.")] = None,
+        ambient_temperature_k: Annotated[
+            float | None, typer.Option(min=150, max=400, help="Temperature of the room [K] (the scene's).")
+        ] = None,
         raw: Annotated[bool, typer.Option("--raw", help="Keep every frame in frames.tif.")] = False,
         bursts: Annotated[int, typer.Option(min=1, help="Bursts in a sequence.")] = 1,
         every: Annotated[float, typer.Option(min=0.0, help="From start to start, in s.")] = 0.0,
         on_abort: Annotated[str, typer.Option(help="After Ctrl-C: keep or discard.")] = "keep",
         as_json: AsJson = False,
     ) -> None:
+        from app.conditions import Conditions
         from app.errors import BadInputError
         from drivers.burst import CapturePlan
 
@@ -58,12 +62,13 @@ def _command(kind: CaptureKind):
             refresh_hz=refresh_hz,
             raw_stack=raw,
         )
-        _take(experiment, plan, bursts, every, "keep" if on_abort == "keep" else "discard", rig_on, as_json)
+        told = Conditions(ambient_temperature_k, None if rig_on is None else rig_on / 60)
+        _take(experiment, plan, bursts, every, "keep" if on_abort == "keep" else "discard", told, as_json)
 
     return command
 
 
-def _take(folder: Path, plan, bursts: int, every_s: float, on_abort, rig_on_s, as_json: bool) -> None:
+def _take(folder: Path, plan, bursts: int, every_s: float, on_abort, told, as_json: bool) -> None:
     from app.experiment import open_experiment
     from app.rig import open_camera
     from app.taking import interruptible, take, take_sequence
@@ -81,11 +86,12 @@ def _take(folder: Path, plan, bursts: int, every_s: float, on_abort, rig_on_s, a
             bar.update(task, completed=now.done)
 
         if bursts == 1:
-            options = {"abort": abort, "on_abort": on_abort, "rig_on_s": rig_on_s}
+            options = {"abort": abort, "on_abort": on_abort, "told": told}
             taken = [take(camera, experiment, plan, progress, **options)]
         else:
             starts = evenly(bursts, every_s)
-            taken = take_sequence(camera, experiment, plan, starts, progress, abort=abort, on_abort=on_abort)
+            options = {"abort": abort, "on_abort": on_abort, "told": told}
+            taken = take_sequence(camera, experiment, plan, starts, progress, **options)
     for one in taken:
         typer.echo(json.dumps(_summary(one)) if as_json else _text(one))
     cut = [one for one in taken if one.burst.outcome != "complete"]

@@ -16,27 +16,29 @@ def kiosk(
     picture: Annotated[Path | None, typer.Argument(help="Grey picture of the native size.")] = None,
     identify: Annotated[str | None, typer.Option(help="Show the identify frame of WIDTHxHEIGHT.")] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 for any.")] = 8642,
+    screen: Annotated[str, typer.Option(help="kiosk, or a card without desktop: /dev/dri/card0.")] = "kiosk",
     wait: Annotated[float, typer.Option(min=1.0, help="Give up after so many seconds.")] = 300.0,
     once: Annotated[bool, typer.Option("--once", help="End when the picture is on screen.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Serve the page that shows the picture, and say when it is on screen.
+    """Show a picture on the projector by a page in its browser, or by a card, and say when it is there.
 
     Open the printed address on the projector, full screen: chromium --kiosk ADDRESS. Move the pointer over
     the page once, so that it hides.
     """
     import time
 
-    from app.kiosk_screen import KioskScreen
-    from app.kiosk_server import serve_kiosk
+    from app.screens import open_screen
     from app.taking import interruptible
 
     shown = _picture(picture, identify)
     rows, cols = shown.shape
-    screen = KioskScreen(timeout_s=wait)
-    with serve_kiosk(screen, port) as address, interruptible() as stopped:
-        typer.echo(json.dumps({"address": address}) if as_json else f"Open {address} on the projector.")
-        digest = screen.show(shown)
+
+    def say(text: str) -> None:
+        typer.echo(json.dumps({"address": text.split()[1]}) if as_json else text)
+
+    with open_screen(screen, port, say, wait) as display, interruptible() as stopped:
+        digest = display.show(shown)
         text = f"On screen, pixel for pixel: {cols} x {rows}, sha256 {digest}"
         typer.echo(json.dumps({"digest": digest, "width_px": cols, "height_px": rows}) if as_json else text)
         while not once and not stopped():

@@ -4,6 +4,7 @@ import contextlib
 import json
 from collections.abc import Iterator
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -28,6 +29,7 @@ def register(cli: typer.Typer) -> None:
     for name in ("on", "off", "mute", "unmute", "freeze", "unfreeze"):
         group.command(name, help=_HELP[name])(_switch(name))
     group.command()(source)
+    group.command()(check)
     cli.add_typer(group, name="projector")
 
 
@@ -62,6 +64,30 @@ def source(
     with _opened(url, wire) as projector:
         projector.select_source(code)
     typer.echo(f"source {code}")
+
+
+def check(
+    experiment: Annotated[Path, typer.Argument(help="Experiment folder, whose scene has a projector.")],
+    screen: Annotated[
+        str, typer.Option(help="kiosk (a page, opened on the projector), or a card such as /dev/dri/card0.")
+    ] = "kiosk",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the kiosk page.")] = 8766,
+    as_json: AsJson = False,
+) -> None:
+    """Show the scene's pattern and let the camera say whether it sees what was sent."""
+    from app.experiment import open_experiment
+    from app.pattern_check import check_projector
+
+    verdict = check_projector(
+        open_experiment(experiment), screen, port, lambda text: typer.echo(text, err=True)
+    )
+    if as_json:
+        typer.echo(json.dumps(asdict(verdict)))
+    else:
+        advice = "" if verdict.good else f" {verdict.advice}"
+        typer.echo(f"{verdict.name}: {verdict.value:.3f}; expected {verdict.expected}.{advice}")
+    if not verdict.good:
+        raise typer.Exit(1)
 
 
 def _switch(name: str):
