@@ -41,7 +41,7 @@ def version() -> str:
 
 
 @router.get("/health")
-def read_health(given: Given) -> Health:
+async def read_health(given: Given) -> Health:
     """Say whether the service answers and how much room it has."""
     free_bytes = shutil.disk_usage(given.config.data_root).free
     return Health(

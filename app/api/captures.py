@@ -99,7 +99,7 @@ class CaptureChange(Strict):
 
 
 @router.get("/captures/running")
-def read_desk(given: Given) -> DeskResource:
+async def read_desk(given: Given) -> DeskResource:
     """Return the capture that is being taken, or the last one."""
     return _desk(given.desk.status)
 

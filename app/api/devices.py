@@ -65,13 +65,13 @@ class Asked(Strict):
 
 
 @router.get("/devices")
-def list_devices(given: Given) -> list[CameraResource | ProjectorResource]:
+async def list_devices(given: Given) -> list[CameraResource | ProjectorResource]:
     """List the devices and their states."""
     return [_resource(given.camera.status), projector_resource(given.projector.report)]
 
 
 @router.get("/devices/camera")
-def read_camera(given: Given) -> CameraResource:
+async def read_camera(given: Given) -> CameraResource:
     """Return the camera's state and its settings as read back."""
     return _resource(given.camera.status)
 

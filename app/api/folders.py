@@ -28,6 +28,7 @@ class Folders:
     def __init__(self, data_root: Path) -> None:
         self.root = data_root / "experiments"
         self.root.mkdir(parents=True, exist_ok=True)
+        self._known: dict[str, tuple[int, Experiment]] = {}
 
     def all(self) -> list[Path]:
         """Return the experiments' folders, newest first."""
@@ -42,7 +43,13 @@ class Folders:
 
     def open(self, experiment: str) -> Experiment:
         """Return an experiment. Raises ApiError when there is none."""
-        return open_experiment(self.folder(experiment))
+        folder = self.folder(experiment)
+        written_ns = (folder / SETTINGS).stat().st_mtime_ns
+        known = self._known.get(experiment)
+        if known is None or known[0] != written_ns:
+            # Bounded by the number of experiments; an old entry is replaced when its file is written.
+            known = self._known[experiment] = (written_ns, open_experiment(folder))
+        return known[1]
 
     def item(self, experiment: str, kind: str, name: str) -> Path:
         """Return the folder of a finished capture or result. Raises ApiError."""

@@ -2,6 +2,7 @@
 
 import contextlib
 import socket
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -11,6 +12,8 @@ import uvicorn
 from fastapi import FastAPI
 
 from app.errors import AirlensError
+
+SWITCH_S = 0.001
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ def listen(host: str, port: int) -> socket.socket:
 
 def server_of(app: FastAPI, tls: Tls | None = None) -> uvicorn.Server:
     """Return a server that says nothing of itself and logs no addresses with queries."""
+    # Reads wait for the camera's thread at most so long; the default is five times that.
+    sys.setswitchinterval(SWITCH_S)
     return uvicorn.Server(
         uvicorn.Config(
             app,

@@ -15,6 +15,7 @@ from app.api.volumes import SolutionCache
 from app.calibration_desk import CalibrationDesk
 from app.desk import CaptureDesk
 from app.jobs import Ledger
+from app.jobs.state import ACTIVE
 from app.kiosk_screen import KioskScreen
 from app.live import LiveCamera
 from app.live_projector import LiveProjector
@@ -51,7 +52,7 @@ def create_services(config: ServiceConfig) -> Services:
         stored=limits.stored_uploads,
     )
     ledger = Ledger(config.jobs_folder)
-    camera = LiveCamera(ledger.append_event)
+    camera = LiveCamera(ledger.append_event, busy=lambda: bool(ledger.jobs(states=ACTIVE, limit=1)))
     projector = LiveProjector(ledger.append_event)
     screen = KioskScreen()
     return Services(

@@ -106,7 +106,7 @@ def test_the_camera_sees_what_the_simulated_projector_shows(tmp_path):
     camera = dataclasses.replace(
         camera, principal_px=(191.5, 143.5), rotation_rad=(1.5707963267948966, 0.0, 0.0)
     )
-    projector = dataclasses.replace(camera, position_m=(0.2, -3.0, 0.0), focal_px=(760.0, 760.0))
+    projector = dataclasses.replace(camera, position_m=(0.2, -3.0, 0.0), focal_px=(900.0, 900.0))
     scene = Scene(room=ROOM, views=(View(camera=camera),), light=ProjectedPattern(projector=projector))
     folder = tmp_path / "experiment"
     create_experiment(folder, ExperimentSettings(scene=scene))

@@ -94,3 +94,17 @@ def test_an_unplugged_camera_is_told_with_what_to_do():
     camera.open("room", lambda: SimulatedCamera(lambda: SCENE, seed=1))
     assert camera.status.state is CameraState.ready
     camera.close()
+
+
+def test_the_picture_is_shown_less_often_while_the_machine_computes():
+    shown: dict[bool, int] = {}
+    for busy in (False, True):
+        live = LiveCamera(lambda kind, body: None, busy=lambda busy=busy: busy)
+        live.open("test", lambda: SimulatedCamera(lambda: SCENE, seed=1))
+        numbers: list[int] = []
+        live.watch(1, lambda frame, seen=numbers: seen.append(frame.number))
+        time.sleep(1.0)
+        live.close()
+        shown[busy] = len(numbers)
+    assert shown[True] <= 11
+    assert shown[False] > shown[True]

@@ -18,7 +18,6 @@ import threading
 import time
 from pathlib import Path
 
-import httpx
 import numpy as np
 from websockets.asyncio.client import connect
 
@@ -46,18 +45,31 @@ server_of(app).run(sockets=[bound])
 """
 
 
+async def read(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, path: str, head: str) -> None:
+    """One request on a kept connection: little of the measured time is the client's own."""
+    writer.write(f"GET {path} HTTP/1.1\r\n{head}\r\n".encode())
+    answer = await reader.readuntil(b"\r\n\r\n")
+    status, *fields = answer.decode().split("\r\n")
+    assert " 200 " in status, status
+    length = next(int(f.split(":")[1]) for f in fields if f.lower().startswith("content-length:"))
+    await reader.readexactly(length)
+
+
 async def poll(
-    url: str, headers: dict[str, str], until_s: float, every_s: float, found_s: list[float]
+    url: str, headers: dict[str, str], until_s: float, every_s: float, found_s: list[float], seed: int
 ) -> None:
-    async with httpx.AsyncClient(base_url=url, headers=headers, timeout=30) as client:
-        number = 0
-        await asyncio.sleep(every_s * np.random.default_rng(id(client) % 2**32).random())
-        while time.monotonic() < until_s:
-            began_s = time.perf_counter()
-            (await client.get(READS[number % len(READS)])).raise_for_status()
-            found_s.append(time.perf_counter() - began_s)
-            number += 1
-            await asyncio.sleep(every_s)
+    host = url.removeprefix("http://")
+    reader, writer = await asyncio.open_connection(*host.split(":"))
+    head = f"Host: {host}\r\n" + "".join(f"{k}: {v}\r\n" for k, v in headers.items())
+    number = seed
+    await asyncio.sleep(every_s * np.random.default_rng(seed).random())
+    while time.monotonic() < until_s:
+        began_s = time.perf_counter()
+        await read(reader, writer, READS[number % len(READS)], head)
+        found_s.append(time.perf_counter() - began_s)
+        number += 1
+        await asyncio.sleep(every_s)
+    writer.close()
 
 
 async def watch(url: str, headers: dict[str, str], until_s: float, frames: list[int]) -> None:
@@ -74,19 +86,41 @@ async def watch(url: str, headers: dict[str, str], until_s: float, frames: list[
 
 async def load(url: str, token: str, options: argparse.Namespace) -> dict[str, object]:
     headers = {"Authorization": f"Bearer {token}"}
-    until_s = time.monotonic() + options.seconds
     found_s: list[float] = []
-    frames: list[int] = []
-    clients = [poll(url, headers, until_s, options.every_s, found_s) for _ in range(options.clients)]
-    viewers = [watch(url, headers, until_s, frames) for _ in range(options.viewers)]
-    await asyncio.gather(*clients, *viewers)
+    # In another process: a viewer is another machine's browser, whose decoding must not delay the readers.
+    command = [sys.executable, "-m", "tests.benchmarks.load_service", "--watch", url, *sizes(options)]
+    viewers = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert viewers.stdin is not None
+    viewers.stdin.write(token + "\n")
+    viewers.stdin.close()
+    assert viewers.stdout is not None
+    assert viewers.stdout.readline().strip() == "watching"
+    until_s = time.monotonic() + options.seconds
+    await asyncio.gather(
+        *(poll(url, headers, until_s, options.every_s, found_s, n) for n in range(options.clients))
+    )
+    frames = json.loads(viewers.stdout.read())
+    viewers.wait()
     milliseconds = 1000 * np.array(found_s)
     return {
         "reads": len(found_s),
         "p50_ms": round(float(np.percentile(milliseconds, 50)), 2),
         "p99_ms": round(float(np.percentile(milliseconds, 99)), 2),
+        "slowest_ms": round(float(milliseconds.max()), 1),
         "viewer_frames_per_s": [round(n / options.seconds, 1) for n in frames],
     }
+
+
+async def watch_all(url: str, token: str, options: argparse.Namespace) -> list[int]:
+    headers, frames = {"Authorization": f"Bearer {token}"}, []
+    print("watching", flush=True)
+    until_s = time.monotonic() + options.seconds
+    await asyncio.gather(*(watch(url, headers, until_s, frames) for _ in range(options.viewers)))
+    return frames
+
+
+def sizes(options: argparse.Namespace) -> list[str]:
+    return ["--viewers", str(options.viewers), "--seconds", str(options.seconds)]
 
 
 def job_wall_s(root: Path, trials: int) -> float:
@@ -109,7 +143,11 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--every-s", type=float, default=1.0, help="pause of one client between two reads")
     parser.add_argument("--trials", type=int, default=0, help="size of the job; 0 for none")
+    parser.add_argument("--watch", metavar="URL", help="only view the live picture; the token on stdin")
     options = parser.parse_args()
+    if options.watch:
+        print(json.dumps(asyncio.run(watch_all(options.watch, sys.stdin.readline().strip(), options))))
+        return
     token = "t" * 43
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
@@ -128,7 +166,7 @@ def main() -> None:
             url = f"http://127.0.0.1:{int(service.stdout.readline())}"
             time.sleep(1)
             job: list[float] = []
-            other = threading.Thread(target=lambda: job.append(job_wall_s(root / "beside", options.trials)))
+            other = threading.Thread(target=lambda: job.append(job_wall_s(root, options.trials)))
             if options.trials:
                 other.start()
             found = asyncio.run(load(url, token, options))
