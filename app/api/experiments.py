@@ -9,7 +9,7 @@ from pydantic import Field
 from app.api.services import Given
 from app.api.strict import Identifier, Strict
 from app.configuration import to_plain
-from app.experiment import Experiment, save_settings
+from app.experiment import Experiment, finished, save_settings
 from app.rehearsal import Rehearsal, rehearse
 from core.scene import ProjectedPattern
 
@@ -93,8 +93,8 @@ def _line(experiment: Experiment) -> ExperimentLine:
         projector=settings.rig.projector is not None,
         light="projector" if isinstance(settings.scene.light, ProjectedPattern) else "texture",
         calibrated=experiment.bundle_path.is_file(),
-        captures=len(experiment.captures()),
-        results=len(list(experiment.results_folder.glob("*/manifest.json"))),
+        captures=len(finished(experiment.captures_folder)),
+        results=len(finished(experiment.results_folder)),
         changed=datetime.fromtimestamp(changed_s, UTC).isoformat(timespec="seconds"),
     )
 

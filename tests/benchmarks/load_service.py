@@ -56,7 +56,12 @@ async def read(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, path:
 
 
 async def poll(
-    url: str, headers: dict[str, str], until_s: float, every_s: float, found_s: list[float], seed: int
+    url: str,
+    headers: dict[str, str],
+    until_s: float,
+    every_s: float,
+    found: list[tuple[str, float]],
+    seed: int,
 ) -> None:
     host = url.removeprefix("http://")
     reader, writer = await asyncio.open_connection(*host.split(":"))
@@ -65,8 +70,9 @@ async def poll(
     await asyncio.sleep(every_s * np.random.default_rng(seed).random())
     while time.monotonic() < until_s:
         began_s = time.perf_counter()
-        await read(reader, writer, READS[number % len(READS)], head)
-        found_s.append(time.perf_counter() - began_s)
+        path = READS[number % len(READS)]
+        await read(reader, writer, path, head)
+        found.append((path, time.perf_counter() - began_s))
         number += 1
         await asyncio.sleep(every_s)
     writer.close()
@@ -86,7 +92,7 @@ async def watch(url: str, headers: dict[str, str], until_s: float, frames: list[
 
 async def load(url: str, token: str, options: argparse.Namespace) -> dict[str, object]:
     headers = {"Authorization": f"Bearer {token}"}
-    found_s: list[float] = []
+    found: list[tuple[str, float]] = []
     # In another process: a viewer is another machine's browser, whose decoding must not delay the readers.
     command = [sys.executable, "-m", "tests.benchmarks.load_service", "--watch", url, *sizes(options)]
     viewers = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -97,15 +103,17 @@ async def load(url: str, token: str, options: argparse.Namespace) -> dict[str, o
     assert viewers.stdout.readline().strip() == "watching"
     until_s = time.monotonic() + options.seconds
     await asyncio.gather(
-        *(poll(url, headers, until_s, options.every_s, found_s, n) for n in range(options.clients))
+        *(poll(url, headers, until_s, options.every_s, found, n) for n in range(options.clients))
     )
     frames = json.loads(viewers.stdout.read())
     viewers.wait()
-    milliseconds = 1000 * np.array(found_s)
+    milliseconds = 1000 * np.array([seconds for _, seconds in found])
+    by_path = {path: [1000 * s for p, s in found if p == path] for path in READS}
     return {
-        "reads": len(found_s),
+        "reads": len(found),
         "p50_ms": round(float(np.percentile(milliseconds, 50)), 2),
         "p99_ms": round(float(np.percentile(milliseconds, 99)), 2),
+        "p99_ms_by_path": {path: round(float(np.percentile(ms, 99)), 1) for path, ms in by_path.items()},
         "slowest_ms": round(float(milliseconds.max()), 1),
         "viewer_frames_per_s": [round(n / options.seconds, 1) for n in frames],
     }
