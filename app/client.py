@@ -198,6 +198,7 @@ class Client:
     def plan(self, experiment: str) -> Plan:
         """Return the newest plan; a job of kind `plan` makes one."""
         return self._ask(Plan, "GET", f"/experiments/{experiment}/plan")
+
     def guide(self, experiment: str, step: StepText = "camera") -> GuideResource:
         """Return what a guided calibration wants next, and how good it is."""
         path = f"/experiments/{experiment}/calibration/guide"

@@ -55,7 +55,8 @@ def test_a_slow_viewer_skips_to_the_newest(camera: Live):
             fast.send(json.dumps({"credits": 1}))
             newest = read(fast)[0]["number"]
         slow.send(json.dumps({"credits": 1}))
-        assert read(slow)[0]["number"] >= newest > before + 5
+        # Both hear of a frame one after the other: the slow one may be a frame behind, never more.
+        assert read(slow)[0]["number"] + 1 >= newest > before + 5
 
 
 def test_the_picture_shows_the_scene_with_its_numbers(camera: Live):
