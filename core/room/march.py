@@ -1,9 +1,9 @@
 """March a room to its steady state: chunks of jitted steps, the step length between them, a running mean.
 
 The march ends when the mean flow of one window differs from the window before by less than `tolerance`
-(relative rms of velocity), or at `longest_s`. What is returned is the mean over the last third of the
-model time: coarse grids hold slow oscillations that a steady truth has not. If a value becomes infinite
-the march goes back to the last window and halves the Courant number, once.
+(relative rms of velocity), at `longest_s`, or after `most_steps`. What is returned is the mean over the
+last third of the model time: coarse grids hold slow oscillations that a steady truth has not. If a value
+becomes infinite the march goes back to the last window and halves the Courant number, once.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,8 @@ class MarchSettings:
     """How long and how finely to march.
 
     `level_ahead_s`: how far each window's heat balance is carried ahead (0 leaves the level of the
-    temperature to time); it begins after `settle_s` and ends with the first two thirds.
+    temperature to time); it begins after `settle_s` and ends with the first two thirds. No window begins
+    after `most_steps`.
     """
 
     longest_s: float = 60.0
@@ -38,6 +39,7 @@ class MarchSettings:
     level_ahead_s: float = 20.0
     settle_s: float = 15.0
     chunk_steps: int = 20
+    most_steps: int = 1_000_000
 
     def __post_init__(self) -> None:
         if not 0.0 < self.courant <= 0.5:
@@ -75,7 +77,7 @@ def march(
     seconds = settings.window_s
     courant, model_s, steps, change = settings.courant, 0.0, 0, float("inf")
     outcome = Outcome.step_limit
-    while model_s < settings.longest_s - 1e-6:
+    while model_s < settings.longest_s - 1e-6 and steps < settings.most_steps:
         start = flow
         mean, new, taken = _window(start, model, settings, courant)
         if not bool(_finite(new)):

@@ -24,6 +24,10 @@ Event = Callable[[dict[str, float]], object]
 # Steps of the finite differences, in prior deviations: beyond the march's own wobble, short of curvature.
 DIFFERENCE = 0.5
 
+# Steps a cell of the room's edge and second of the reference room, which takes half as many: a room whose
+# air turns out far faster than what was stated about it must not take hours.
+_STEPS = 1.5
+
 
 @setting
 class RoomSettings:
@@ -104,6 +108,7 @@ def attempt(
         window_s=min(5.0, seconds) * pace,
         settle_s=0.15 * seconds * pace,
         level_ahead_s=20.0 * pace,
+        most_steps=round(_STEPS * float(np.prod(where.grid.cells)) ** (1 / 3) * seconds),
     )
     done = march(flow, model, timing, on_window=tell)
     return Attempt(parameters, done, seen(done.mean, model, vertices))

@@ -100,3 +100,17 @@ def test_a_march_that_diverges_ends_with_the_last_good_state():
 def test_an_unstable_courant_number_is_refused():
     with pytest.raises(SettingError, match="stable from 0 to"):
         MarchSettings(courant=0.9)
+
+
+def test_a_march_begins_no_window_after_its_most_steps():
+    model = flat_room(8, 0.01, (as_it_is, as_it_is), (as_it_is, as_it_is), 1.0)
+    warm = jnp.broadcast_to(jnp.linspace(1.0, 0.0, 8)[:, None, None], model.grid.cells)
+    start = air_at_rest(model, warm, 0.1)
+
+    settings = MarchSettings(longest_s=10.0, window_s=1.0, tolerance=0.0, level_ahead_s=0.0, most_steps=100)
+    end = march(start, model, settings)
+
+    # Windows of at least forty steps: the third is the last.
+    assert 100 <= end.steps <= 100 + 40
+    assert end.model_s < 10.0
+    assert end.outcome is Outcome.step_limit
