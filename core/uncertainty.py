@@ -1,11 +1,12 @@
 """Standard deviations of a marched room: from its parameters, grid, closure and last correction.
 
-    var = D C D^T + (a |f_fine - f_coarse| smoothed + c |f_other - f_coarse| smoothed + b s)^2 + var_correction
+    var = D C D^T + (a |f_fine - f_coarse| + c m |f_other - f_coarse| + b m s)^2 + var_correction
 
 D holds the fields' derivatives in the fitted parameters and C their posterior covariance. The second term
-is what a grid and a closure cannot represent: two grids differ by about what the finer one still lacks,
-two closures by about what either does. a, b and c were set once so that 95 % intervals hold on rooms of
-several closures; s is the field's own scale times the share of the images that is left unexplained.
+is what a grid and a closure cannot represent, smoothed: two grids differ by about what the finer one still
+lacks, two closures by about what either does, and both matter by the share m of the images that the room
+leaves unexplained. s is the field's own scale. a, b and c were set on one reference room at two levels of
+information, so that 95 % intervals hold there.
 """
 
 import equinox as eqx
@@ -15,9 +16,25 @@ from scipy import ndimage
 
 Field = Float[np.ndarray, "vx vy vz ..."]
 
-# Shares of the differences of grids and of closures, and of s.
-_GRID_SHARE, _CLOSURE_SHARE, _FLOOR_SHARE = 0.7, 0.4, 0.4
 _SMOOTH_VERTICES = 2.5
+
+
+class Represented(eqx.Module):
+    """What grid and closure leave open: two differences of fields, the scale s, and the shares a, c m, b m."""
+
+    grid: Field
+    closure: Field
+    scale: float
+    shares: tuple[float, float, float] = eqx.field(static=True)
+
+    def deviation(self) -> Field:
+        """One sigma."""
+        sigma = [_SMOOTH_VERTICES] * 3 + [0.0] * (self.grid.ndim - 3)
+        grid, closure = (
+            np.sqrt(ndimage.gaussian_filter(np.square(d), sigma)) for d in (self.grid, self.closure)
+        )
+        a, c, b = self.shares
+        return a * grid + c * closure + b * self.scale
 
 
 class Deviation(eqx.Module):
@@ -30,21 +47,17 @@ class Deviation(eqx.Module):
 def deviation(
     derivatives: list[Field],
     covariance: Float[np.ndarray, "active active"],
-    differences: tuple[Field, Field],
-    scale: float,
+    represented: Represented,
     extra: tuple[Field | float, Field | float] = (0.0, 0.0),
 ) -> Deviation:
     """Combine the three terms; parameters are in units of their prior deviations.
 
-    `differences` are those of two grids and of two closures; `scale` is s; `extra` are
-    a correction's variances before and after the data.
+    `extra` are a correction's variances before and after the data.
     """
     roots = np.linalg.cholesky(covariance) if len(derivatives) else np.zeros((0, 0))
-    stacked = np.stack(derivatives) if derivatives else np.zeros((0, *differences[0].shape))
+    stacked = np.stack(derivatives) if derivatives else np.zeros((0, *represented.grid.shape))
     after = np.sum(np.tensordot(roots.T, stacked, axes=1) ** 2, axis=0) + extra[1]
     before = np.sum(stacked**2, axis=0) + extra[0]
-    sigma = [_SMOOTH_VERTICES] * 3 + [0.0] * (differences[0].ndim - 3)
-    grid, closure = (np.sqrt(ndimage.gaussian_filter(np.square(d), sigma)) for d in differences)
-    represented = _GRID_SHARE * grid + _CLOSURE_SHARE * closure + _FLOOR_SHARE * scale
-    informed = 1.0 - (after + represented**2) / (before + represented**2)
-    return Deviation(np.sqrt(after + represented**2), np.clip(informed, 0.0, 1.0))
+    left = represented.deviation() ** 2
+    informed = 1.0 - (after + left) / (before + left)
+    return Deviation(np.sqrt(after + left), np.clip(informed, 0.0, 1.0))

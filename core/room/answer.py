@@ -14,12 +14,14 @@ from core.room.residue import temperature_correction
 from core.room.runs import DIFFERENCE, Attempt
 from core.room.sentences import balances, contradictions, misfit, undetermined
 from core.room.setup import RoomLayout
-from core.uncertainty import Deviation, deviation
+from core.uncertainty import Deviation, Represented, deviation
 
 # Prior size of the temperature's last correction, as a share of the departure from the profile.
 CORRECTION_SHARE = 0.3
 # Taken for the share of the images that is left unexplained where there are none.
 _UNSEEN_SHARE = 0.3
+# What grid, closure and scale leave open (a, c and b of `core.uncertainty`).
+_SHARES = {"excess_k": (0.1, 1.0, 0.2), "pressure_m2_s2": (0.3, 2.0, 4.0), "velocity_m_s": (0.3, 2.0, 0.75)}
 
 
 class Solved(eqx.Module):
@@ -49,9 +51,9 @@ def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
     excess = best.seen.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     variances = (change.prior_variance_k2[:, None, :] * free, change.variance_k2[:, None, :] * free)
     share = unexplained(solved.data, residual, values)
-    temperature = _deviation(solved, "excess_k", share * local_k, variances)
-    pressure = _deviation(solved, "pressure_m2_s2", share * departure(best.seen.pressure_m2_s2), (0.0, 0.0))
-    velocity = _deviation(solved, "velocity_m_s", share * rms(best.seen.velocity_m_s), (0.0, 0.0))
+    temperature = _deviation(solved, "excess_k", local_k, share, variances)
+    pressure = _deviation(solved, "pressure_m2_s2", departure(best.seen.pressure_m2_s2), share)
+    velocity = _deviation(solved, "velocity_m_s", rms(best.seen.velocity_m_s), share)
     x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(excess.shape))
     return Solution(
         x,
@@ -115,7 +117,11 @@ def rms(field: Float[np.ndarray, "..."]) -> float:
 
 
 def _deviation(
-    solved: Solved, name: str, scale: float, extra: tuple[np.ndarray | float, np.ndarray | float]
+    solved: Solved,
+    name: str,
+    scale: float,
+    share: float,
+    extra: tuple[np.ndarray | float, np.ndarray | float] = (0.0, 0.0),
 ) -> Deviation:
     start = getattr(solved.runs[0], name)
     moved = [(getattr(run, name) - start) / DIFFERENCE for run in solved.runs[1:]]
@@ -126,4 +132,6 @@ def _deviation(
         if solved.data.planes:
             # The profile of height is measured by the plane; only departures from it are the grid's.
             between[0] = between[0] - between[0].mean((0, 1))
-    return deviation(moved, solved.posterior.covariance, (between[0], between[1]), scale, extra)
+    a, c, b = _SHARES[name]
+    represented = Represented(between[0], between[1], scale, (a, c * share, b * share))
+    return deviation(moved, solved.posterior.covariance, represented, extra)

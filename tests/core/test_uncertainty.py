@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from core.uncertainty import deviation
+from core.uncertainty import Represented, deviation
 
 SHAPE = (6, 5, 7)
-NOTHING = (np.zeros(SHAPE), np.zeros(SHAPE))
+NOTHING = Represented(np.zeros(SHAPE), np.zeros(SHAPE), 0.0, (1.0, 1.0, 1.0))
 
 
 def test_parameters_spread_by_their_posterior_and_inform_where_it_is_narrow():
@@ -13,7 +13,7 @@ def test_parameters_spread_by_their_posterior_and_inform_where_it_is_narrow():
     # Prior variances are 1; the second parameter is halved in deviation, and they go against one another.
     covariance = np.array([[0.5, -0.2], [-0.2, 0.25]])
 
-    found = deviation([warmer, stronger], covariance, NOTHING, 0.0)
+    found = deviation([warmer, stronger], covariance, NOTHING)
 
     np.testing.assert_allclose(found.std[:3] ** 2, 0.5, rtol=1e-6)
     np.testing.assert_allclose(found.std[3:] ** 2, 0.5 + 4 * 0.25 + 2 * 2 * -0.2, rtol=1e-6)
@@ -23,11 +23,13 @@ def test_parameters_spread_by_their_posterior_and_inform_where_it_is_narrow():
 
 def test_what_grid_and_closure_cannot_represent_is_added_and_is_not_informed():
     grid, closure = np.full(SHAPE, 0.3), np.full(SHAPE, -0.2)
+    represented = Represented(grid, closure, 2.0, (0.5, 0.4, 0.1))
 
-    bare = deviation([], np.zeros((0, 0)), NOTHING, 1.0)
-    wider = deviation([], np.zeros((0, 0)), (grid, closure), 1.0)
+    alone = deviation([], np.zeros((0, 0)), represented)
+    with_one = deviation([np.ones(SHAPE)], np.array([[0.25]]), represented)
 
-    assert bare.std.min() == pytest.approx(bare.std.max())
-    assert bare.std.min() > 0
-    assert wider.std.min() > bare.std.max()
-    assert wider.informed.max() == 0
+    # Even fields stay even under smoothing: the three terms add, the parameter's variance joins them.
+    assert alone.std.max() == pytest.approx(0.5 * 0.3 + 0.4 * 0.2 + 0.1 * 2.0, rel=1e-6)
+    assert alone.informed.max() == 0
+    np.testing.assert_allclose(with_one.std**2, alone.std**2 + 0.25, rtol=1e-6)
+    assert 0 < with_one.informed.min() < 0.75
