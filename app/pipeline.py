@@ -15,6 +15,7 @@ from app.durable import write_text
 from app.experiment import Experiment, new_id, open_experiment, write_manifest
 from app.judge import aged
 from app.measure import Measurement, measure, with_calibration
+from app.plan import settled
 from app.presets import preset as preset_called
 from app.presets import resolved, solve_with
 from app.provenance import provenance
@@ -66,12 +67,18 @@ def reconstruct(
     check_problem(measurement.problem, regime_for(measurement.problem))
     on_stage("check the rendered reference against the captured one")
     checked = rendered_agreement(scene, measurement.references)
+    on_stage("settle what auto leaves open")
+    problem, choices = settled(measurement, preset)
     on_stage(f"solve ({preset})")
-    solution = solve_with(solve, measurement.problem, on_event=on_event, store=store, should_stop=should_stop)
+    solution = solve_with(solve, problem, on_event=on_event, store=store, should_stop=should_stop)
     on_stage("keep the result")
-    assumed = (calibrated, *aged(experiment), *measurement.notes, checked, *solution.notes)
     result = into or _new_folder(experiment, preset)
-    _keep(result, experiment, preset, measurement, solution, assumed, time.perf_counter() - started)
+    told = {
+        "assumed": [calibrated, *aged(experiment), *measurement.notes, checked, *solution.notes],
+        "choices": [to_plain(choice) for choice in choices],
+        "wall_s": time.perf_counter() - started,
+    }
+    _keep(result, experiment, preset, measurement, solution, told)
     on_stage("report")
     write_report(experiment.folder, result)
     return Reconstruction(result, solution, measurement, time.perf_counter() - started)
@@ -89,14 +96,13 @@ def _keep(
     preset: str,
     measurement: Measurement,
     solution: Solution,
-    assumed: tuple[str, ...],
-    wall_s: float,
+    told: dict[str, Any],
 ) -> None:
     captures = {role: experiment.latest_capture(role) for role in ("reference", "flow")}
     write_result(
         folder / "result.nc",
         solution,
-        {"title": experiment.settings.title, "preset": preset, "assumed": "\n".join(assumed)},
+        {"title": experiment.settings.title, "preset": preset, "assumed": "\n".join(told["assumed"])},
     )
     write_shifts(folder, measurement.problem.shifts)
     lines = (json.dumps({k: float(np.float64(v)) for k, v in row.items()}) for row in solution.history)
@@ -109,8 +115,7 @@ def _keep(
             "outcome": solution.outcome.name,
             "advice": solution.outcome.value,
             "solver_s": solution.solver_s,
-            "wall_s": wall_s,
-            "assumed": list(assumed),
+            **told,
             "captures": {role: path.name for role, path in captures.items()},
             "windows": [len(shift.displacement_px) for shift in measurement.problem.shifts],
             "settings": to_plain(experiment.settings),

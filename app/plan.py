@@ -1,6 +1,7 @@
 """`plan`: what this experiment would see and cost, before anybody measures. Kept as plan.json beside it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from app.configuration import to_plain
 from app.durable import write_json
 from app.experiment import Experiment, open_experiment
 from app.machine import this_machine
-from app.measure import with_calibration
+from app.measure import Measurement, with_calibration
 from app.plan_record import PLAN_FILE, ChoiceLine, MapLine, Plan, PresetLine, SeenLine, ViewLine
 from app.presets import REFERENCE, STANDARD
 from app.tradeoff import ExpectedError, expected_error
@@ -20,6 +21,7 @@ from core.plan.choice import Choice
 from core.plan.choices import Resolution, resolve
 from core.plan.cost import Speed, Work, draft_work, grid_work, knows_walls, level_of, paper_work, room_work
 from core.plan.expected import ExpectedFlow, expected_flow
+from core.plan.measured import resolve_measured
 from core.plan.seen import seen
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import Signal, other_light, shift_map, signal
@@ -27,6 +29,8 @@ from core.plan.words import blindness, broken, verdict
 from core.problem import Problem
 
 OnStage = Callable[[str], object]
+# JSON has no infinity.
+_LARGEST = 1e30
 
 
 def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lambda stage: None) -> Plan:
@@ -81,6 +85,19 @@ def stated_problem(experiment: Experiment) -> Problem:
 def departure_k(flow: ExpectedFlow) -> float:
     """Rms departure of the expected temperature from the mean at each height, as the score takes it."""
     return rms(departure(inner(flow.excess_k)))
+
+
+def settled(measurement: Measurement, preset: str) -> tuple[Problem, list[ChoiceLine]]:
+    """The measured problem with its `auto` values settled, and the choices as they are told.
+
+    The grid's is the draft's: other presets have levels of their own.
+    """
+    problem = measurement.problem
+    resolution = resolve_measured(problem, measurement.references)
+    grid = resolution.scene.solve.grid if preset == "draft" else problem.scene.solve.grid
+    scene = replace(resolution.scene, solve=replace(problem.scene.solve, grid=grid))
+    made = Problem(scene, problem.shifts, problem.planes, problem.sensors, problem.images)
+    return made, choice_lines(resolution)
 
 
 def choice_lines(resolution: Resolution) -> list[ChoiceLine]:
@@ -186,8 +203,8 @@ def _choice_line(choice: Choice) -> ChoiceLine:
     return ChoiceLine(
         name=choice.name,
         value=choice.value,
-        bound=choice.bound,
-        limit=choice.limit,
+        bound=min(choice.bound, _LARGEST),
+        limit=min(choice.limit, _LARGEST),
         unit=choice.unit,
         cost_share=choice.cost_share,
         reason=choice.reason,

@@ -74,6 +74,7 @@ def render_report(experiment: Experiment, result_folder: Path) -> str:
         sections=_sections(experiment, manifest, solution, shifts, truth),
         scores=_score_rows(score_solution(solution, truth)) if truth else [],
         assumed=manifest["assumed"],
+        choices=_choices(manifest),
         facts=_facts(experiment),
         origin=_origin(manifest),
     )
@@ -262,6 +263,16 @@ def _describe(known: Any) -> str:
     if hasattr(known, "file"):
         parts.append(known.file)
     return ", ".join(parts)
+
+
+def _choices(manifest: dict[str, Any]) -> list[tuple[str, str, str, str, str]]:
+    """What auto resolved to: name, value, bound against limit, cost, reason; none in results of old."""
+    rows = []
+    for choice in manifest.get("choices", []):
+        held = f"{choice['bound']:.1g} of {choice['limit']:.1g} {choice['unit']}" if choice["limit"] else "-"
+        cost = f"{100 * choice['cost_share']:.0f} %" if choice["cost_share"] >= 0.005 else "below 1 %"
+        rows.append((choice["name"], str(choice["value"]), held, cost, choice["reason"]))
+    return rows
 
 
 def _origin(manifest: dict[str, Any]) -> list[tuple[str, str]]:

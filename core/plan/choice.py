@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-# A choice may cost the shift a tenth of one window's noise, and a grid a tenth of the flow's departures.
+# A choice may cost the shift a tenth of one window's noise.
 SHARE = 0.1
 # A bound from a sample is doubled for what the sample missed.
 SAFETY = 2.0

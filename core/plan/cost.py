@@ -21,6 +21,7 @@ from core.room.runs import RoomSettings
 from core.scene import Heater, Inlet, Wall
 from core.setting import setting
 from core.solve.draft import draft_grid
+from core.solve.recipes import PAPER_STEPS
 from core.solve.room import closure_name
 
 Level = Literal["walls", "plane", "images"]
@@ -100,4 +101,4 @@ def grid_work(problem: Problem) -> Work:
 
 def paper_work() -> Work:
     """Iterations of the published recipe."""
-    return Work(80_000.0, 1.0)
+    return Work(float(PAPER_STEPS), 1.0)

@@ -77,7 +77,6 @@ def expected_flow(problem: Problem, excess_k: float | None = None) -> ExpectedFl
 
     Raises SettingError for a contrast that is not a finite number above 0, or at which air is below 0 K.
     """
-    ambient = problem.scene.air.ambient_temperature_k
     if excess_k is not None and not (np.isfinite(excess_k) and 0 < excess_k < 5000):
         raise SettingError(
             f"The expected contrast is {excess_k:g} K; expected a temperature difference above 0 and below "
@@ -88,11 +87,17 @@ def expected_flow(problem: Problem, excess_k: float | None = None) -> ExpectedFl
     if any(isinstance(b, Inlet | Heater) for b in problem.scene.boundary) and known:
         marched = _marched(problem)
         return marched if excess_k is None else _rescaled(marched, excess_k, known)
+    return plume_flow(problem, excess_k)
+
+
+def plume_flow(problem: Problem, excess_k: float | None = None) -> ExpectedFlow:
+    """A plume of the contrast asked for, else of the largest stated, in the middle of the room."""
+    known = largest_contrast_k(problem)
     peak_k = excess_k or known or DEFAULT_EXCESS_K
     grid = VertexGrid(problem.scene.room, (_VERTICES, _VERTICES, _VERTICES))
     reason = "asked for" if excess_k else "the largest stated" if known else "assumed: nothing is stated"
-    excess = _plume_k(problem.scene, grid, min(peak_k, 0.9 * 5000 - ambient))
-    return ExpectedFlow(grid, excess, f"a plume of {peak_k:.3g} K in the middle of the room ({reason})")
+    source = f"a plume of {peak_k:.3g} K in the middle of the room ({reason})"
+    return ExpectedFlow(grid, _plume_k(problem.scene, grid, peak_k), source)
 
 
 def _marched(problem: Problem) -> ExpectedFlow:

@@ -2,19 +2,23 @@
 
 import numpy as np
 
-from core.plan.choice import SHARE, Choice
+from core.plan.choice import Choice
 from core.plan.expected import ExpectedFlow
 from core.scene import Inlet, Scene
 
 # A plane jet and a heated cavity are unsteady from about these on (Schlichting; Paolucci 1990).
 _LAMINAR_RE, _LAMINAR_RA = 1000.0, 1e8
 _CELLS = (32, 48, 64, 96)
+_GRID_SHARE = 0.025
 
 
 def grid(scene: Scene, flow: ExpectedFlow) -> Choice:
-    """Trilinear cells lose their curvature: rms of h^2 / 8 times the second differences across the view."""
+    """Trilinear cells lose their curvature: rms of h^2 / 8 times the second differences across the view.
+
+    The limit is a fortieth of the departures: half of it already shows in a draft of the reference rooms.
+    """
     departure = flow.excess_k - flow.excess_k.mean(axis=(0, 1))
-    size = float(departure.std())
+    limit_k = _GRID_SHARE * float(departure.std())
     lost = [np.diff(departure, 2, axis=a)[1:-1, 1:-1, 1:-1] / 8 for a in (0, 2)]
     vertices = max(flow.grid.shape)
     at_expected = float(np.sqrt(np.mean(sum(np.mean(part**2) for part in lost))))
@@ -22,10 +26,10 @@ def grid(scene: Scene, flow: ExpectedFlow) -> Choice:
     bounds: dict[int, float] = {
         n: at_expected * ((vertices - 1) / n) ** 2 for n in (_CELLS if given == "auto" else (given,))
     }
-    value = next((n for n, bound in bounds.items() if bound <= SHARE * size), max(bounds))
+    value = next((n for n, bound in bounds.items() if bound <= limit_k), max(bounds))
     return Choice(
-        "grid", value, bounds[value], SHARE * size, "K", (value / _CELLS[-1]) ** 3,
-        "what trilinear cells of this size lose of the expected flow, against a tenth of its departures",
+        "grid", value, bounds[value], limit_k, "K", (value / _CELLS[-1]) ** 3,
+        "what trilinear cells of this size lose of the expected flow, against a fortieth of its departures",
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from core.solve.mlp import MlpSolveSettings, solve_mlp
 from core.solve.regime import Regime, Weights
 
 OnEvent = Callable[[dict[str, Any]], object]
+PAPER_STEPS = 80_000
 
 
 def regime_for(problem: Problem) -> Regime:
@@ -49,15 +50,20 @@ def solve_paper(
 
     Rays go through the network; there are its three losses and no belief about smoothness.
     """
-    settings = MlpSolveSettings(
+    settings = paper_settings(problem, PAPER_STEPS)
+    watch = _told(on_event, problem)
+    return solve_mlp(problem, settings, on_event=on_event, store=store, should_stop=should_stop, watch=watch)
+
+
+def paper_settings(problem: Problem, steps: int) -> MlpSolveSettings:
+    """The published recipe for `steps` iterations."""
+    return MlpSolveSettings(
         regime=regime_for(problem),
         network=MlpSettings(hidden_layers=4, width=128),
-        loop=LoopSettings(steps=80_000, patience=80_000),
+        loop=LoopSettings(steps=steps, patience=steps),
         weights=Weights(smoothness=0.0),
         rays="network",
     )
-    watch = _told(on_event, problem)
-    return solve_mlp(problem, settings, on_event=on_event, store=store, should_stop=should_stop, watch=watch)
 
 
 def _told(on_event: OnEvent | None, problem: Problem) -> Callable[[Solution], object] | None:

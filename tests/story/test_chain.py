@@ -15,8 +15,12 @@ from app.errors import BadInputError
 from app.experiment import interrupted, open_experiment, read_manifest
 from app.export import export
 from app.pipeline import reconstruct
+from app.plan import plan
+from app.plan_record import read_plan
+from app.presets import PRESETS
 from app.score import score_experiment
 from app.simulate import simulate
+from core.displacement import standard_deviation_px
 from tests.story.conftest import ROOM
 
 
@@ -49,6 +53,27 @@ def test_the_drift_between_the_exposures_is_found(done):
     size = float(np.hypot(drift.column_px, drift.row_px))
     # 0.02 px were applied; aliasing leaves a few thousandths of it.
     assert size == pytest.approx(0.02, rel=0.05)
+
+
+def test_every_auto_is_settled_and_told_with_its_bound(done, experiment):
+    told = {choice["name"]: choice for choice in read_manifest(done.folder)["choices"]}
+    assert told["ray model"]["value"] == "straight"
+    assert told["ray model"]["bound"] <= told["ray model"]["limit"]
+    assert told["data term"]["value"] == "displacement"
+    # A print has no projector: nothing is decided about one.
+    assert not {"projector order", "irradiance"} & told.keys()
+    assert told["transport"]["reason"] in (done.folder / "report.html").read_text()
+
+
+def test_a_plan_says_what_the_reconstruction_then_finds(done, experiment):
+    made = plan(experiment)
+    view, shift = made.views[0], done.measurement.problem.shifts[0]
+    measured = float(np.sqrt(np.mean(np.median(standard_deviation_px(shift), axis=0) ** 2)))
+    assert view.noise_px == pytest.approx(measured, rel=0.2)
+    sizes = np.linalg.norm(shift.displacement_px, axis=1)
+    assert 0.4 < view.shift_p90_px / np.percentile(sizes, 90) < 2.5
+    assert read_plan(open_experiment(experiment)) == made
+    assert {line.preset for line in made.presets} == set(PRESETS)
 
 
 def test_the_result_is_readable_by_others_with_cf_names_and_units(done):
