@@ -2,7 +2,9 @@
 
 from typing import Literal
 
+import numpy as np
 from fastapi import APIRouter
+from jaxtyping import Float
 
 from app.api.problems import ApiError
 from app.api.services import Given
@@ -10,6 +12,7 @@ from app.api.strict import Identifier, Strict
 from app.experiment import Experiment
 from app.rehearsal import calibrate_simulated
 from calibration.bundle import Bundle, CalibratedOptics, from_json
+from core.geometry import Optics, Vector3
 
 router = APIRouter(tags=["calibrations"])
 
@@ -22,12 +25,23 @@ class CalibrationItem(Strict):
     advice: str
 
 
+class StandingResource(Strict):
+    """Where a camera or a projector stands, and where the corners of its picture meet the back wall [m]."""
+
+    name: str
+    role: Literal["camera", "projector"]
+    position_m: list[float]
+    corners_m: list[list[float]]
+
+
 class CalibrationResource(Strict):
-    """The calibration of an experiment."""
+    """The calibration of an experiment; `room_m` are the room's lower and upper corner."""
 
     state: Literal["calibrated"] = "calibrated"
     date: str | None
     items: list[CalibrationItem]
+    room_m: list[list[float]]
+    rig: list[StandingResource]
 
 
 class NewCalibration(Strict):
@@ -59,7 +73,48 @@ def _resource(experiment: Experiment) -> CalibrationResource:
     if not experiment.bundle_path.is_file():
         raise ApiError("not_found", "This experiment is not calibrated.", "Calibrate it.")
     bundle = from_json(experiment.bundle_path.read_text(encoding="utf-8"))
-    return CalibrationResource(date=bundle.date, items=_items(bundle))
+    room = experiment.settings.scene.room
+    return CalibrationResource(
+        date=bundle.date,
+        items=_items(bundle),
+        room_m=[list(room.lower_m), list(room.upper_m)],
+        rig=_rig(bundle, room.upper_m),
+    )
+
+
+def _rig(bundle: Bundle, beyond_m: Vector3) -> list[StandingResource]:
+    """Every optics with the corners of its picture on the wall: as calibrated, or the room's own back wall."""
+    wall = bundle.wall
+    point = np.array(beyond_m if wall is None else wall.point_m)
+    normal = np.array((0.0, 1.0, 0.0) if wall is None else wall.normal)
+    projector = () if bundle.projector is None else (bundle.projector,)
+    return [
+        StandingResource(
+            name=one.name,
+            role="projector" if one is bundle.projector else "camera",
+            position_m=list(one.optics.position_m),
+            corners_m=_corners(one.optics, point, normal),
+        )
+        for one in (*bundle.cameras, *projector)
+    ]
+
+
+def _corners(
+    optics: Optics, point_m: Float[np.ndarray, "3"], normal: Float[np.ndarray, "3"]
+) -> list[list[float]]:
+    """Where the picture's corners meet a plane; distortion is left out, for it bends no picture of a rig."""
+    start = np.array(optics.position_m)
+    found = []
+    for u, v in ((0, 0), (optics.width_px, 0), (optics.width_px, optics.height_px), (0, optics.height_px)):
+        ray = [
+            (u - optics.principal_px[0]) / optics.focal_px[0],
+            (v - optics.principal_px[1]) / optics.focal_px[1],
+        ]
+        direction = optics.rotation.T @ np.array([*ray, 1.0])
+        ahead = float(normal @ direction)
+        length = float(normal @ (point_m - start)) / ahead if abs(ahead) > 1e-6 else 1.0
+        found.append([float(part) for part in start + length * direction])
+    return found
 
 
 def _items(bundle: Bundle) -> list[CalibrationItem]:

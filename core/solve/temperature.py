@@ -252,7 +252,9 @@ def _minimise(
     def record(flat: np.ndarray) -> None:
         history.append({"iteration": len(history) + 1.0, "change": float(np.abs(flat).max() / system.per_k)})
         if on_event:
-            on_event(history[-1])
+            n = (prior + flat.reshape(shape))[:, shape[1] // 2]
+            plane = -ambient * n / (air.ambient_refractivity + n)
+            on_event({**history[-1], "excess_plane_k": plane.astype(np.float32)})
 
     size = int(np.prod(shape))
     found, info = cg(

@@ -2,6 +2,7 @@ import threading
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -10,7 +11,7 @@ from app.cli import create_cli
 from app.errors import BadInputError
 from app.jobs import JobSpec, Ledger
 from app.jobs.folder import JobFolder, Owner
-from app.jobs.task import StoppedError
+from app.jobs.task import PLANE_FILE, StoppedError
 from app.pipeline import reconstruct
 from app.results import read_result
 
@@ -43,6 +44,11 @@ def test_a_job_gives_the_result_of_the_pipeline_bit_for_bit(experiment: Path, tm
     assert folder.target().parent == experiment / "results"
     assert folder.target().name in (folder.target() / "report.html").read_text()
     assert [path for path in (experiment / "results").iterdir() if path.name.startswith(".")] == []
+    # What it showed while it ran: the middle plane of the growing field.
+    plane = np.load(folder.attempt(1) / PLANE_FILE)
+    assert plane.shape == (found.temperature_k.shape[0], found.temperature_k.shape[2])
+    final = found.temperature_k[:, found.temperature_k.shape[1] // 2]
+    assert np.corrcoef(plane.ravel(), final.ravel())[0, 1] > 0.8
 
 
 def test_a_stopped_job_leaves_no_result_and_an_order_without_experiment_is_refused(

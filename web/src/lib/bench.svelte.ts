@@ -30,6 +30,8 @@ class Bench {
   problem = $state.raw<Problem | null>(null);
   working = $state<string | null>(null);
   done = $state("");
+  /** Grows with everything that is told of a guided calibration. */
+  guided = $state(0);
 
   private stream: EventSource | null = null;
   private pending = new Set<string>();
@@ -216,7 +218,7 @@ class Bench {
   private listen(): void {
     const stream = new EventSource("/api/events");
     const heard = (message: MessageEvent<string>) => this.hear(JSON.parse(message.data) as ServiceEvent);
-    for (const kind of ["job", "device", "capture", "log", "experiment"]) stream.addEventListener(kind, heard);
+    for (const kind of ["job", "device", "capture", "calibration", "log", "experiment"]) stream.addEventListener(kind, heard);
     stream.onopen = () => {
       if (!this.connected) void this.later("all");
       this.connected = true;
@@ -235,6 +237,10 @@ class Bench {
       if (event.body["state"] !== "running") void this.later("experiment");
     } else if (event.kind === "device") void this.later("devices");
     else if (event.kind === "experiment") void this.later("all");
+    else if (event.kind === "calibration") {
+      this.guided++;
+      if (event.body["state"] !== "running") void this.later("all");
+    }
     else if (event.job) {
       this.progress(event);
       if (event.kind === "state") void this.later("all");

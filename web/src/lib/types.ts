@@ -188,6 +188,51 @@ export interface Result {
   manifest: Record<string, unknown>;
 }
 
+export interface Standing {
+  name: string;
+  role: "camera" | "projector";
+  position_m: number[];
+  corners_m: number[][];
+}
+
+export interface Calibration {
+  state: string;
+  date: string | null;
+  items: { name: string; value: string; advice: string }[];
+  room_m: number[][];
+  rig: Standing[];
+}
+
+export interface Wanted {
+  kind: "board" | "place" | "wall" | "level" | "dark" | "light";
+  text: string;
+  column: number | null;
+  row: number | null;
+  span: number | null;
+  nearer: "" | "left" | "right" | "upper" | "lower";
+  tilt_deg: number;
+  roll_deg: number;
+}
+
+export interface Guide {
+  state: "idle" | "running" | "failed";
+  step: string;
+  reason: string;
+  wanted: Wanted | null;
+  done: number;
+  total: number;
+  issues: string[];
+  complete: boolean;
+  views: { name: string; points: number; rms_px: number | null; issues: string[] }[];
+  width_px: number | null;
+  height_px: number | null;
+  coverage: boolean[][];
+  covered: number;
+  rms_px: number | null;
+  residuals_px: number[][];
+  advice: string[];
+}
+
 export interface Comparison {
   scores: { name: string; value: number; unit: string }[];
   readings: { name: string; unit: string; position_m: number[]; measured: number; std: number; found: number }[];
