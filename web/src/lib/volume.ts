@@ -51,6 +51,7 @@ export function createScene(place: HTMLElement): Scene3d {
   surface.getProperty().setOpacity(0.7);
   const arrowActor = vtkActor.newInstance();
   const lineActor = vtkActor.newInstance();
+  for (const actor of [arrowActor, lineActor]) actor.getProperty().setLineWidth(2);
   const outline = vtkOutlineFilter.newInstance();
   const frame = actorOf(outline.getOutputPort());
   frame.getProperty().setColor(0.6, 0.65, 0.7);
@@ -76,7 +77,9 @@ export function createScene(place: HTMLElement): Scene3d {
     renderer.removeAllViewProps();
     renderer.addVolume(volume);
     for (const actor of [surface, arrowActor, lineActor, frame]) if (actor.getMapper()) renderer.addActor(actor);
+    if (!loaded) lookFrom(renderer.getActiveCamera(), image.getCenter());
     if (!loaded) renderer.resetCamera();
+    if (!loaded) renderer.getActiveCamera().zoom(1.35);
     loaded = true;
   }
 
@@ -107,6 +110,14 @@ export function createScene(place: HTMLElement): Scene3d {
   }
 
   return { load, show, picture, close };
+}
+
+/** From the front, a little to the left and above; z points upwards. */
+function lookFrom(camera: ReturnType<ReturnType<ReturnType<typeof vtkGenericRenderWindow.newInstance>["getRenderer"]>["getActiveCamera"]>, centre: number[]) {
+  const [x = 0, y = 0, z = 0] = centre;
+  camera.setFocalPoint(x, y, z);
+  camera.setPosition(x - 0.55, y - 1, z + 0.45);
+  camera.setViewUp(0, 0, 1);
 }
 
 function imageOf(values: Numbers, axes: Grid["axes"]) {

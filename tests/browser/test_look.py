@@ -1,0 +1,124 @@
+"""Looking at results: every field with its uncertainty, truth and error; two results; three dimensions."""
+
+import dataclasses
+import re
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import Page, expect
+
+from app.durable import write_json, write_text
+from app.experiment import Experiment, write_manifest
+from app.rehearsal import SAMPLE_ROOM
+from app.results import write_result
+from app.truth import read_volume
+from core.result import Outcome, Solution
+from tests.browser.conftest import Opens, Station, snapshot
+
+PAINTED = re.compile(r"\d+")
+COUNT = 32
+
+
+def room() -> Solution:
+    """The packaged room as a solver would hand it back: smoothed, and honest about its error."""
+    truth = read_volume(SAMPLE_ROOM)
+    every = [
+        np.linspace(0, len(axis) - 1, COUNT).round().astype(int) for axis in (truth.x_m, truth.y_m, truth.z_m)
+    ]
+    at = np.ix_(*every)
+    temperature = truth.temperature_k[at].astype(np.float64)
+    error = 0.1 * np.random.default_rng(0).normal(size=temperature.shape)
+    return Solution(
+        *(np.linspace(axis[0], axis[-1], COUNT) for axis in (truth.x_m, truth.y_m, truth.z_m)),
+        temperature_k=temperature + error,
+        pressure_m2_s2=truth.pressure_m2_s2[at].astype(np.float64),
+        velocity_m_s=truth.velocity_m_s[at].astype(np.float64),
+        temperature_std_k=0.1 + 0 * error,
+        outcome=Outcome.converged,
+        solver_s=1.0,
+        notes=("Straight rays: their bending is below a hundredth of the noise.",),
+    )
+
+
+def keep(experiment: Experiment, name: str, solution: Solution, preset: str, loss: float) -> None:
+    folder = experiment.results_folder / name
+    folder.mkdir(parents=True)
+    write_result(folder / "result.nc", solution, {})
+    write_text(
+        folder / "history.jsonl", "".join(f'{{"step": {n}, "loss": {loss / n}}}\n' for n in range(1, 30))
+    )
+    write_text(folder / "report.html", "<h1>Report</h1>")
+    write_json(folder / "result.json", {})
+    settings = {
+        "preset": preset,
+        "solve": {"cells": 48, "rounds": len(preset)},
+        "created": "2026-01-01T00:00:00+00:00",
+    }
+    write_manifest(folder, settings)
+
+
+def choose(page: Page, field: str, label: str = "Field") -> None:
+    page.locator("label").filter(has_text=re.compile(rf"^\s*{label}")).locator("select").select_option(field)
+
+
+def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: Opens, tmp_path: Path):
+    watched = opens(station.address)
+    page = watched.page
+    page.locator("button.next").click()
+    expect(page.locator("button.next")).to_have_text("Calibrate", timeout=60_000)
+    folders = station.app.state.services.folders
+    experiment = folders.open(folders.all()[0].name)
+    found = room()
+    keep(experiment, "20260101T000000-standard", found, "standard", 1.0)
+    warmer = dataclasses.replace(found, temperature_k=found.temperature_k + 0.2)
+    keep(experiment, "20260102T000000-draft", warmer, "draft", 3.0)
+    page.reload()
+    page.get_by_role("button", name="Look", exact=True).click()
+    slices = page.locator(".slice canvas")
+    expect(slices.first).to_have_attribute("data-painted", PAINTED, timeout=60_000)
+    expect(page.locator("main")).to_contain_text("T: rms error of departures")
+    choose(page, "T_error")
+    expect(page.locator(".bar").first).to_contain_text("found minus true")
+    snapshot(page, "look-error")
+    choose(page, "T")
+    page.get_by_role("button", name="Its uncertainty").click()
+    expect(page.locator(".bar").first).to_contain_text("standard deviation of T")
+    page.get_by_role("button", name="Back to T").click()
+
+    choose(page, "20260101T000000-standard", "Compare with")
+    expect(page.locator("main")).to_contain_text("solve.rounds")
+    expect(slices).to_have_count(9)
+    expect(slices.nth(8)).to_have_attribute("data-painted", PAINTED)
+    expect(page.locator(".chart canvas")).to_be_visible()
+    # The two differ by 0.2 K everywhere: the colour of the difference is one colour.
+    slices.nth(6).hover()
+    expect(page.locator(".slice").nth(6)).to_contain_text("0.200 K")
+    snapshot(page, "look-two-results")
+    choose(page, "", "Compare with")
+
+    page.get_by_role("button", name="Show the volume").click()
+    place = page.locator(".volume")
+    expect(place).to_have_attribute("data-frame-ms", PAINTED, timeout=60_000)
+    pictures = {"volume": place.screenshot()}
+    page.get_by_label("Volume", exact=True).uncheck()
+    for mode in ("Isosurface", "Arrows", "Streamlines"):
+        page.get_by_label(mode).check()
+        page.wait_for_timeout(300)
+        pictures[mode] = place.screenshot()
+        snapshot(page, f"look-{mode.lower()}")
+        page.get_by_label(mode).uncheck()
+    # Four ways to see it, and each shows something else.
+    assert len(set(pictures.values())) == 4
+    page.get_by_label("Volume", exact=True).check()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Keep the picture").click()
+    assert Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
+
+    for label, start in {"HDF5": b"\x89HDF", "OpenFOAM": b"PK", "PNG": b"\x89PNG", "CSV": b"x [m]"}.items():
+        with page.expect_download() as download:
+            page.get_by_role("button", name=label, exact=True).click()
+        assert Path(download.value.path()).read_bytes().startswith(start), label
+    with page.context.expect_page() as opened:
+        page.get_by_role("button", name="Report").click()
+    expect(opened.value.get_by_role("heading")).to_have_text("Report")
+    assert watched.complaints == []

@@ -1,0 +1,31 @@
+"""Before anybody measures: what would be seen, what it would cost, and what would help."""
+
+import re
+
+from playwright.sync_api import expect
+
+from tests.browser.conftest import Opens, Station, snapshot
+
+
+def test_a_plan_says_what_would_be_seen_and_what_each_preset_would_cost(station: Station, opens: Opens):
+    watched = opens(station.address)
+    page = watched.page
+    page.locator("button.next").click()
+    expect(page.locator("button.next")).to_have_text("Calibrate", timeout=60_000)
+    page.get_by_role("button", name="Plan", exact=True).first.click()
+    expect(page.get_by_text("This experiment has no plan yet")).to_be_visible()
+    # A plan that is not there yet is no fault of the page's.
+    watched.complaints.clear()
+    page.locator("main form").get_by_role("button", name="Plan").click()
+    expect(page.locator(".verdicts li").first).to_be_visible(timeout=200_000)
+    canvas = page.locator(".shiftmap canvas")
+    expect(canvas).to_have_attribute("data-painted", "1")
+    canvas.hover()
+    expect(page.locator(".shiftmap figcaption")).to_contain_text(re.compile(r"mpx, [\d.]+ times the noise"))
+    expect(page.locator("main")).to_contain_text("Choices made by auto")
+    snapshot(page, "plan")
+    page.get_by_role("button", name="Reconstruct", exact=True).click()
+    preset = page.locator(".choice").filter(has_text="standard").first
+    expect(preset).to_contain_text(re.compile(r"about \d+ (s|min)"))
+    snapshot(page, "reconstruct-predicted")
+    assert watched.complaints == []
