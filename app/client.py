@@ -368,9 +368,10 @@ class Client:
         """Return what a job told while it ran."""
         return self._ask(Curves, "GET", f"/jobs/{job}/curves", query={"points": str(points)})
 
-    def growing_field(self, job: str) -> Float[np.ndarray, "nx nz"]:
-        """Return the room's middle plane, T - T0 [K], as a running job last showed it."""
-        return _unpack(self._bytes(f"/jobs/{job}/field"))
+    def growing_field(self, job: str) -> Float[np.ndarray, "nx nz"] | None:
+        """Return the room's middle plane, T - T0 [K], as a job last showed it; None while there is none."""
+        answer = self._bytes(f"/jobs/{job}/field")
+        return None if answer.status_code == 204 else _unpack(answer)
 
     def wait(self, job: str, limit_s: float = 3600.0, every_s: float = 0.5) -> JobResource:
         """Return a job once it ended. Raises TimeoutError after `limit_s`."""

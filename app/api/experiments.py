@@ -10,6 +10,7 @@ from app.api.services import Given
 from app.api.strict import Identifier, Strict
 from app.configuration import to_plain
 from app.experiment import Experiment, finished, save_settings
+from app.plan_record import PLAN_FILE
 from app.rehearsal import Rehearsal, rehearse
 from core.scene import ProjectedPattern
 
@@ -26,6 +27,7 @@ class ExperimentLine(Strict):
     projector: bool
     light: Literal["texture", "projector"]
     calibrated: bool
+    planned: bool
     captures: int
     results: int
     changed: str
@@ -93,6 +95,7 @@ def _line(experiment: Experiment) -> ExperimentLine:
         projector=settings.rig.projector is not None,
         light="projector" if isinstance(settings.scene.light, ProjectedPattern) else "texture",
         calibrated=experiment.bundle_path.is_file(),
+        planned=(experiment.folder / PLAN_FILE).is_file(),
         captures=len(finished(experiment.captures_folder)),
         results=len(finished(experiment.results_folder)),
         changed=datetime.fromtimestamp(changed_s, UTC).isoformat(timespec="seconds"),

@@ -8,7 +8,6 @@ from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
 from app.api.bodies import body
-from app.api.problems import ApiError
 from app.api.services import Given, Services
 from app.api.strict import Identifier, Strict
 from app.api.volumes import pack
@@ -137,13 +136,13 @@ def read_curves(
 
 @router.get("/jobs/{job}/field", response_class=Response, responses=NUMBERS)
 def read_field(given: Given, job: Identifier) -> Response:
-    """Return the room's middle plane, T - T0 [K] over x and z, as the newest attempt last showed it."""
+    """Return the room's middle plane, T - T0 [K] over x and z, as last shown; 204 while there is none."""
     found = given.ledger.get(job)
     path = JobFolder(given.ledger.folder / found.id).attempt(found.attempt) / PLANE_FILE
     try:
         plane = np.load(path, allow_pickle=False)
     except (FileNotFoundError, ValueError):
-        raise ApiError("not_found", "This job has shown no field yet.", "Look again in a moment.") from None
+        return Response(status_code=204)
     packed = pack(plane, "f32")
     return Response(packed.content, media_type="application/octet-stream", headers=packed.headers)
 

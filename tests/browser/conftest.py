@@ -127,4 +127,5 @@ def snapshot(page: Page, name: str) -> None:
     """Keep a screenshot where AIRLENS_SCREENSHOTS says, for somebody to look at."""
     folder = os.environ.get("AIRLENS_SCREENSHOTS")
     if folder:
+        page.evaluate("scrollTo(0, 0)")
         page.screenshot(path=str(Path(folder) / f"{name}.png"), full_page=True)

@@ -46,6 +46,18 @@ def test_axe_finds_nothing_on_any_page(station: Station, opens: Opens, theme: st
         snapshot(page, f"axe-{theme}-{name}")
 
 
+def test_every_page_fits_a_screen_of_1024_by_768(station: Station, opens: Opens):
+    page = opens(station.address, viewport={"width": 1024, "height": 768}, color_scheme="dark").page
+    page.locator("button.next").click()
+    expect(page.locator("button.next")).to_have_text("Calibrate", timeout=60_000)
+    for name in PAGES:
+        page.get_by_role("button", name=name, exact=True).first.click()
+        expect(page.locator("main")).to_have_attribute("aria-label", name)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 1024, name
+        assert page.locator("header").bounding_box()["height"] < 120, name
+        snapshot(page, f"1024-{name}")
+
+
 def test_a_page_without_a_token_says_how_to_get_one(station: Station, opens: Opens):
     page = opens(f"http://127.0.0.1:{station.port}/").page
     alert = page.get_by_role("alert")

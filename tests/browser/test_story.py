@@ -34,6 +34,7 @@ def test_from_an_empty_bench_to_an_export_in_seven_clicks(station: Station, open
     expect(page.locator(".library li")).to_have_count(2, timeout=LONG_MS)
     snapshot(page, "3-capture")
     next_step(page, "Reconstruct a draft")
+    expect(page.locator(".growing canvas")).to_have_attribute("data-painted", "1", timeout=LONG_MS)
     snapshot(page, "4-reconstruct")
     next_step(page, "Look at the result")
     expect(page.locator(".slice canvas").first).to_have_attribute("data-painted", PAINTED, timeout=LONG_MS)

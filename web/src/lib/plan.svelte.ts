@@ -5,21 +5,20 @@ import type { Job, Plan, PlannedPreset } from "./types";
 
 class Planned {
   plan = $state.raw<Plan | null>(null);
-  missing = $state("");
   job = $derived(bench.jobs.find((one) => one.kind === "plan" && one.experiment === bench.experiment) ?? null);
   busy = $derived(this.job !== null && ["queued", "running", "lost"].includes(this.job.state));
 
   async read(experiment: string | null): Promise<void> {
-    if (!experiment) this.plan = null;
-    else
-      try {
-        this.plan = await get<Plan>(`/experiments/${experiment}/plan`);
-        this.missing = "";
-      } catch (error) {
-        if (!(error instanceof ProblemError)) throw error;
-        this.plan = null;
-        this.missing = error.problem.detail;
-      }
+    if (!experiment || !bench.current?.planned) {
+      this.plan = null;
+      return;
+    }
+    try {
+      this.plan = await get<Plan>(`/experiments/${experiment}/plan`);
+    } catch (error) {
+      if (!(error instanceof ProblemError)) throw error;
+      bench.problem = error.problem;
+    }
   }
 
   async make(excess_k: number | null): Promise<void> {

@@ -8,6 +8,7 @@ export interface Experiment {
   projector: boolean;
   light: "texture" | "projector";
   calibrated: boolean;
+  planned: boolean;
   captures: number;
   results: number;
   changed: string;
