@@ -43,6 +43,7 @@ def regimes(
     network_steps: Annotated[int, typer.Option(help="Steps of the network, for each regime.")] = 500,
     width: Annotated[int, typer.Option(help="Width of the network's four layers.")] = 128,
     batch: Annotated[int, typer.Option(help="Collocation points a step; the paper's is 8192.")] = 8192,
+    only: Annotated[list[str] | None, typer.Option("--regime", help="One regime; again for more.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON line a regime.")] = False,
 ) -> None:
     """Each regime of losses on one volume: errors of T, p, u, and pictures of truth, prediction and error."""
@@ -51,7 +52,7 @@ def regimes(
     name = f"regimes_{setup}_{information}_{method}"
     lines: list[dict[str, Any]] = []
     found: dict[Regime, Solution] = {}
-    for regime in REGIMES:
+    for regime in (r for r in REGIMES if not only or r in only):
         began = time.process_time()
         found[regime] = _solve(problem, regime, method, cells, MlpSettings(width=width), batch, network_steps)
         cpu_s = round(time.process_time() - began, 1)
