@@ -53,7 +53,8 @@ def regimes(
     name = f"regimes_{setup}_{information}_{method}"
     lines: list[dict[str, Any]] = []
     found: dict[Regime, Solution] = {}
-    for regime in (r for r in REGIMES if not only or r in only):
+    chosen: list[Regime] = [regime for regime in REGIMES if not only or str(regime) in only]
+    for regime in chosen:
         began = time.process_time()
         found[regime] = _solve(
             problem, regime, method, cells, MlpSettings(width=width), batch, rays, network_steps
