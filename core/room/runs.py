@@ -43,7 +43,7 @@ class RoomSettings:
     rounds: int = 3
     coarse_rounds: int = 4
     coarse_step: float = 1.0
-    worthwhile: float = 0.7
+    worthwhile: float = 0.85
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 45.0
