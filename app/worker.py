@@ -48,7 +48,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if lock is None:
         return TAKEN
     with lock:
-        _introduce(folder, owner)
+        try:
+            _introduce(folder, owner)
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            # No room even for the worker's own name: its exit status says so.
+            return NO_SPACE
         threading.Thread(target=_renew, args=(folder, owner, options.lease_s), daemon=True).start()
         return _attempt(folder, owner, stop)
 

@@ -16,6 +16,8 @@ from app.api.settings import Limits
 PUBLIC_FILES = frozenset({"/", "/index.html", "/favicon.svg"})
 PUBLIC_FOLDER = "/assets/"
 UPLOADS = "/api/uploads"
+# Answers without an end: each holds a connection, and memory, for as long as somebody looks.
+STREAMS = frozenset({"/api/events", "/api/devices/camera/live", "/api/devices/camera/live.mjpeg"})
 
 
 class Guard:
@@ -29,6 +31,7 @@ class Guard:
         self._reads = RateLimiter(limits.reads_per_s)
         self._writes = RateLimiter(limits.writes_per_s)
         self._failures = RateLimiter(limits.failures_per_s)
+        self._open_streams = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -38,7 +41,16 @@ class Guard:
         refusal = self._refusal(scope)
         if refusal is not None:
             await self._refuse(scope, send, refusal)
-        elif scope["type"] == "websocket":
+            return
+        streams = scope["path"] in STREAMS
+        self._open_streams += streams
+        try:
+            await self._pass(scope, receive, send)
+        finally:
+            self._open_streams -= streams
+
+    async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "websocket":
             await self._app(scope, receive, send)
         else:
             await self._app(scope, self._bounded(scope, receive), self._finished(scope, send))
@@ -54,7 +66,12 @@ class Guard:
             return _too_many(wait_s) if wait_s and refusal.code == "token_missing" else refusal
         bucket = self._reads if method in SAFE_METHODS else self._writes
         wait_s = bucket.wait_s(client)
-        return _too_many(wait_s) if wait_s else self._oversized(scope, caller)
+        if wait_s:
+            return _too_many(wait_s)
+        if scope["path"] in STREAMS and self._open_streams >= self._limits.streams:
+            cause = f"{self._open_streams} streams are open, as many as this service keeps."
+            return ApiError("rate_limited", cause, "Close another page of it.", headers={"Retry-After": "5"})
+        return self._oversized(scope, caller)
 
     def _oversized(self, scope: Scope, caller: Caller) -> ApiError | None:
         lengths = caller.values(b"content-length")

@@ -33,7 +33,6 @@ from app.jobs import JobSpec, JobState, Ledger
 from app.jobs.folder import JobFolder, Owner
 
 ROLES = ("supervisor", "worker", "web")
-UP_S = 30.0
 CONFIG = """
 devices = ["cpu:0", "cpu:1"]
 max_losses = 100000
@@ -73,25 +72,25 @@ def files_of(folder: Path) -> dict[str, bytes]:
 class Kept:
     """A process that is started again whenever it is gone, as a service manager would."""
 
-    def __init__(self, command: list[str], log: Path) -> None:
-        self._command, self._log = command, open(log, "ab")
+    def __init__(self, command: list[str], log: Path, port: int | None = None) -> None:
+        self._command, self._log, self._port = command, open(log, "ab"), port
         self._child: subprocess.Popen[bytes] | None = None
-        self._started_s = 0.0
 
     def pid(self) -> int:
         """Return the process id, after starting the process again if need be."""
         if self._child is None or self._child.poll() is not None:
-            self._started_s = time.monotonic()
             self._child = subprocess.Popen(self._command, stdout=self._log, stderr=self._log)
         return self._child.pid
 
-    def age_s(self) -> float:
-        """Seconds since the process was last started."""
-        return time.monotonic() - self._started_s
-
-    def is_alive(self) -> bool:
-        """True while the process runs."""
-        return self._child is not None and self._child.poll() is None
+    def is_up(self) -> bool:
+        """True while the process runs and, if it has a port, accepts connections there."""
+        if self._child is None or self._child.poll() is not None:
+            return False
+        if self._port is None:
+            return True
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self._port), 0.2):
+            return True
+        return False
 
     def end(self) -> None:
         """Stop it as an operator would."""
@@ -151,7 +150,7 @@ def disturb(
                 time.sleep(chance.expovariate(1 / pause_s))
                 alive = living(ledger.folder)  # looked up again: only what lives can be killed
                 # A service that is killed before it is up would never take the jobs.
-                if owner not in alive and kept.is_alive() and (not waiting or kept.age_s() > UP_S):
+                if owner not in alive and kept.is_up():
                     alive[owner] = ("web", "")
                 _kill_one(chance, alive, counts)
             else:
@@ -253,7 +252,7 @@ def by_service(folder: Path) -> tuple[Kept, Submit]:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     program = [sys.executable, "-c", "from app.cli import main; main()"]
-    kept = Kept([*program, "serve", str(folder), "--port", str(port)], folder / "serve.log")
+    kept = Kept([*program, "serve", str(folder), "--port", str(port)], folder / "serve.log", port)
 
     def submit(key: str, spec: JobSpec) -> str:
         token = (folder / "service" / "token").read_text().strip()

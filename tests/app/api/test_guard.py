@@ -1,7 +1,9 @@
 """Nobody passes who should not: hostile headers on every route of the app, found by iterating over it."""
 
 import http.client
+import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -11,7 +13,8 @@ from fastapi.routing import APIRoute, APIWebSocketRoute
 from starlette.routing import Route, WebSocketRoute
 
 from app.api import Limits, create_app
-from app.api.settings import service_config
+from app.api.server import listen, serving
+from app.api.settings import new_token, service_config
 from tests.app.api.conftest import Live, is_problem
 from tests.run_async import run_async
 
@@ -253,3 +256,25 @@ def test_a_body_without_a_length_is_bounded_while_it_comes(live: Live):
         encode_chunked=True,
     )
     assert connection.getresponse().status == 422
+
+
+def test_streams_beyond_the_limit_are_refused_until_one_is_closed(tmp_path: Path):
+    bound = listen("127.0.0.1", 0)
+    port, token = bound.getsockname()[1], new_token()
+    config = service_config(tmp_path, token, port, limits=Limits(streams=2))
+    headers = {"Authorization": f"Bearer {token}"}
+    url = f"http://127.0.0.1:{port}"
+    with serving(create_app(config), bound), httpx.Client(base_url=url, headers=headers) as client:
+        with client.stream("GET", "/api/events") as one, client.stream("GET", "/api/events") as two:
+            assert (one.status_code, two.status_code) == (200, 200)
+            refused = client.get("/api/events")
+            assert is_problem(refused, "rate_limited")
+            assert refused.headers["retry-after"] == "5"
+            assert client.get("/api/health").status_code == 200
+        until_s = time.monotonic() + 20
+        while True:
+            with client.stream("GET", "/api/events") as again:
+                if again.status_code == 200:
+                    break
+            assert time.monotonic() < until_s
+            time.sleep(0.05)
