@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 
@@ -44,7 +45,7 @@ class ResultLine(Strict):
 
 
 class FieldResource(Strict):
-    """One scalar on the result's vertices."""
+    """One scalar on the result's vertices; `low` and `high` leave out a hundredth on each side."""
 
     name: str
     unit: str
@@ -52,6 +53,8 @@ class FieldResource(Strict):
     kind: Kind
     minimum: float
     maximum: float
+    low: float
+    high: float
     mean: float
 
 
@@ -239,7 +242,7 @@ def _score_lines(scored: dict[str, Any]) -> list[ScoreResource]:
 
 
 def _first_line(solve: object) -> str:
-    return (solve.__doc__ or "").strip().split("\n")[0]
+    return (solve.__doc__ or "").strip().split("\n")[0].split(" Raises ")[0]
 
 
 def _shown(given: Services, experiment: str, result: str) -> tuple[Path, Shown]:
@@ -268,6 +271,7 @@ def _line(folder: Path) -> ResultLine:
 
 def _field(volume: Volume) -> FieldResource:
     values = volume.values
+    low, high = np.percentile(values, (1, 99))
     return FieldResource(
         name=volume.name,
         unit=volume.unit,
@@ -275,6 +279,8 @@ def _field(volume: Volume) -> FieldResource:
         kind=volume.kind,
         minimum=float(values.min()),
         maximum=float(values.max()),
+        low=float(low),
+        high=float(high),
         mean=float(values.mean(dtype="float64")),
     )
 

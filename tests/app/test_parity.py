@@ -2,6 +2,8 @@
 
 import inspect
 import re
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -55,19 +57,20 @@ def asked_by_the_page() -> set[tuple[str, tuple[str, ...]]]:
 
 
 def asked_by_the_client() -> set[tuple[str, tuple[str, ...]]]:
-    found = set()
-    for method in requests().values():
-        text = inspect.getsource(method)
-        paths = re.findall(r"""f?"(/[^"]*)\"""", text)
-        verb = re.search(r'"(GET|POST|PUT|PATCH|DELETE)"', text)
-        if "self._http.delete" in text:
-            name = "DELETE"
-        elif "self._http.post" in text:
-            name = "POST"
-        else:
-            name = verb.group(1) if verb else "GET"
-        found |= {(name, shape(path)) for path in paths}
-    return found
+    return {asked for method in requests().values() for asked in asked_by(method)}
+
+
+def asked_by(method: Callable) -> set[tuple[str, tuple[str, ...]]]:
+    text = inspect.getsource(method)
+    paths = re.findall(r"""f?"(/[^"]*)\"""", text)
+    verb = re.search(r'"(GET|POST|PUT|PATCH|DELETE)"', text)
+    if "self._http.delete" in text:
+        name = "DELETE"
+    elif "self._http.post" in text:
+        name = "POST"
+    else:
+        name = verb.group(1) if verb else "GET"
+    return {(name, shape(path)) for path in paths}
 
 
 def matches(wanted: tuple[str, ...], offered: tuple[str, ...]) -> bool:
@@ -92,3 +95,32 @@ def test_every_operation_is_in_the_client_and_so_in_the_shell(app: FastAPI):
         if key in browsers_own or key == mjpeg:
             continue
         assert any(key[0] == m and matches(p, key[1]) for m, p in asked), f"the client lacks {operation}"
+
+
+def table(app: FastAPI) -> list[tuple[str, str, str]]:
+    """Every request of the page: the API's operation, the client's method, the line for a shell."""
+    offered, methods = described(app), {name: asked_by(method) for name, method in requests().items()}
+    rows = []
+    for verb, path in sorted(asked_by_the_page()):
+        if path[:1] == ("session",) or path[-1] == "live":
+            continue  # a browser's own: the cookie, and the socket of the picture that `frame` also gives
+        operation = next((o for (m, p), o in offered.items() if m == verb and matches(path, p)), "")
+        method = next(
+            (n for n, asked in methods.items() if any(m == verb and matches(p, path) for m, p in asked)), ""
+        )
+        rows.append((operation, method, f"airlens remote {method}" if method else ""))
+    return rows
+
+
+def test_every_action_of_the_page_has_its_operation_its_method_and_its_line(app: FastAPI):
+    rows = table(app)
+    assert len(rows) >= 30
+    assert [row for row in rows if not all(row)] == []
+
+
+if __name__ == "__main__":
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        for row in table(create_app(service_config(Path(folder), new_token(), 8765))):
+            sys.stdout.write("| " + " | ".join(f"`{cell}`" for cell in row) + " |\n")

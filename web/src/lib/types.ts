@@ -173,6 +173,8 @@ export interface Field {
   kind: "found" | "uncertainty" | "truth" | "error";
   minimum: number;
   maximum: number;
+  low: number;
+  high: number;
   mean: number;
 }
 
