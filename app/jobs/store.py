@@ -5,6 +5,7 @@ on a network file system: SQLite's locks do not hold there.
 """
 
 import contextlib
+import shutil
 import sqlite3
 import threading
 from collections.abc import Iterator, Sequence
@@ -16,6 +17,7 @@ from app.jobs.errors import LedgerError
 from app.jobs.state import ACTIVE, JobState
 
 SCHEMA = 1
+_FULL_BYTES = 1 << 16
 _ACTIVE = ", ".join(f"'{state}'" for state in ACTIVE)
 _STATES = ", ".join(f"'{state}'" for state in JobState)
 
@@ -148,7 +150,12 @@ class Store:
 
 
 def _explained(path: Path, error: sqlite3.DatabaseError) -> LedgerError:
+    cause = str(error)
+    with contextlib.suppress(OSError):
+        # A full disk shows as an "I/O error" or a file that cannot be opened, too.
+        if shutil.disk_usage(path.parent).free < _FULL_BYTES:
+            cause = f"the disk is full ({error})"
     return LedgerError(
-        f"The job ledger {path} could not be used: {error}. What was acknowledged before is kept, this "
+        f"The job ledger {path} could not be used: {cause}. What was acknowledged before is kept, this "
         "change is not. Free space on its disk, or check that it is on a local, writable disk; then repeat."
     )
