@@ -79,7 +79,7 @@ export function createScene(place: HTMLElement): Scene3d {
     for (const actor of [surface, arrowActor, lineActor, frame]) if (actor.getMapper()) renderer.addActor(actor);
     if (!loaded) lookFrom(renderer.getActiveCamera(), image.getCenter());
     if (!loaded) renderer.resetCamera();
-    if (!loaded) renderer.getActiveCamera().zoom(1.35);
+    if (!loaded) renderer.getActiveCamera().zoom(1.1);
     loaded = true;
   }
 
