@@ -142,7 +142,9 @@ def solve_temperature(
     stiff = [mass * (length / h) ** 2 for length, h in zip(lengths, grid.spacing_m, strict=True)]
     stiffness = (stiff[0], stiff[1], stiff[2])
     slopes = steepest_slopes(problem.scene)
-    system = _System(grid, operators, weights, known, per_k, stiffness, mass, slopes)
+    # Without a plane nobody knows the profile: only its slopes are believed, not its size.
+    held = mass if problem.planes else 1e-3 * mass
+    system = _System(grid, operators, weights, known, per_k, stiffness, held, slopes)
     n, iterations, settled = _minimise(system, problem.shifts, prior, air, settings, on_event)
     temperature = air.ambient_refractivity * air.ambient_temperature_k / (n + air.ambient_refractivity)
     x, y, z = grid.axes_m
@@ -162,11 +164,15 @@ def solve_temperature(
 
 
 def prior_temperature(problem: Problem, grid: VertexGrid) -> Volume:
-    """The first known plane's profile over height carried through the room; ambient without a plane.
+    """The first known plane's profile over height carried through the room; without a plane the outlets' and
+    sensors' mean, and ambient where there are none.
 
     Only the profile is carried: a jet in the plane is somewhere else a metre further on.
     """
-    volume = np.full(grid.shape, problem.scene.air.ambient_temperature_k)
+    # What leaves the room has its mean temperature: without it the prior would draw a warm room to ambient.
+    measured = [kelvin for _, kelvin, _ in known_temperature(problem, grid).means]
+    level = float(np.mean(measured)) if measured else problem.scene.air.ambient_temperature_k
+    volume = np.full(grid.shape, level)
     for plane in problem.planes[:1]:
         axis, _ = wall_index(plane.wall)  # type: ignore[arg-type]
         on_grid = np.expand_dims(plane_on_grid(grid, plane, plane.temperature_k), axis)
