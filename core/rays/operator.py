@@ -67,10 +67,14 @@ def build(
     averaged over a square window, as a displacement estimate sees it; the slope of the trilinear field,
     which jumps at a cell's faces, is then averaged exactly. A pixel that does not see the back wall, or
     sees a point that the projector cannot reach, gets zero. Raises SettingError for fewer than two vertices
-    on an axis.
+    on an axis, or no pixel.
     """
     if min(shape) < 2:
         raise SettingError(f"The grid has shape {shape}; expected at least 2 vertices on every axis.")
+    if len(pixels) == 0:
+        raise SettingError(
+            f"View {view} has no pixel or window to see the room by. Check that the wall is in the picture."
+        )
     with jax.enable_x64(True):
         lens = pinhole(scene.views[view].camera)
         points_m, px_per_m, seen = map(np.asarray, _wall(scene.room, lens, jnp.asarray(pixels, jnp.float64)))

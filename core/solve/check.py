@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from core.geometry import Box, Vector3
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.scene import Inlet, Outlet, Wall
 from core.setting import SettingError
@@ -153,11 +154,16 @@ def _overlap(first, second) -> bool:
     )
 
 
+def _in_room(room: Box, point_m: Vector3) -> bool:
+    """A sensor on a wall is in the room."""
+    return all(low <= p <= high for low, p, high in zip(room.lower_m, point_m, room.upper_m, strict=True))
+
+
 def _check_sensors(problem: Problem) -> None:
     for sensor in problem.sensors:
         for point in np.atleast_2d(sensor.position_m):
             x, y, z = (float(c) for c in point)
-            if not problem.scene.room.contains((x, y, z)):
+            if not _in_room(problem.scene.room, (x, y, z)):
                 raise SettingError(
                     f"A sensor at ({x:g}, {y:g}, {z:g}) m is outside the room "
                     f"{problem.scene.room.lower_m} to {problem.scene.room.upper_m} m. "

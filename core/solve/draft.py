@@ -10,6 +10,7 @@ from core.problem import Problem
 from core.rays.operator import StraightRayOperator, build
 from core.result import Solution
 from core.scene import Scene
+from core.solve.check import check_problem
 from core.solve.temperature import OnEvent, TemperatureSettings, solve_temperature
 
 _apply = jax.jit(lambda operator, values: operator.apply(values))
@@ -53,6 +54,7 @@ def solve_draft(
     problem: Problem, settings: TemperatureSettings | None = None, *, on_event: OnEvent | None = None
 ) -> Solution:
     """Temperature in at most some ten seconds. Raises SettingError."""
+    check_problem(problem, "bos+boundary")
     grid = draft_grid(problem.scene)
     operators = tuple(
         _OnTheDevice(build(problem.scene, view, shift.centres_px, grid.shape, float(shift.window_px)))
