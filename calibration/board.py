@@ -24,6 +24,10 @@ class Detection:
     pixels_px: Float[np.ndarray, "points 2"]
 
 
+# OpenCV's detectors stop with an assertion on pictures smaller than that.
+_LEAST_SQUARE_PX = 3
+
+
 @dataclass(frozen=True)
 class Chessboard:
     """A chessboard by its inner corners."""
@@ -44,6 +48,8 @@ class Chessboard:
         """All corners, or none: a chessboard must be seen whole."""
         grey = to_8_bit(image)
         size = (self.columns, self.rows)
+        if min(grey.shape) < _LEAST_SQUARE_PX * min(size):
+            return None
         found, corners = cv2.findChessboardCornersSB(grey, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
         if not found:
             flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE

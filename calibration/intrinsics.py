@@ -21,6 +21,10 @@ PENALTY = 3.0
 OUTLIER_SIGMAS = 6.0
 
 
+# Only made-up pictures fit better; the logarithm needs a floor.
+_PERFECT_PX = 1e-9
+
+
 @dataclass(frozen=True)
 class Intrinsics:
     """One device alone: what was adjusted, with which distortion model, from which sightings.
@@ -95,7 +99,7 @@ def _fit(
             adjusted = adjust(adjusted.devices, turned, sightings)
         rms = adjusted.rms_px(sightings)
         free = 4 + sum(flags) + 6 * len(poses)
-        tried[model] = (rms, numbers * np.log(rms**2) + free * PENALTY, adjusted)
+        tried[model] = (rms, numbers * np.log(max(rms, _PERFECT_PX) ** 2) + free * PENALTY, adjusted)
         intrinsics, poses = adjusted.devices[0].intrinsics, adjusted.poses
     chosen = models[0]
     for model in models[1:]:

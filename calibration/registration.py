@@ -79,6 +79,8 @@ def register(
         )
     if mask.sum() < MINIMUM_PIXELS:
         raise ImageError(f"The mask holds {mask.sum()} px; expected at least {MINIMUM_PIXELS}. Widen it.")
+    if not (np.isfinite(reference).all() and np.isfinite(moved).all()):
+        raise ImageError("A picture holds values that are not finite. Take both pictures again.")
     coarse, fine = (_Problem.of(reference, moved, mask, blur_px) for blur_px in _BLURS_PX)
     unknowns, _, _ = coarse.solve(np.zeros(4))
     unknowns, iterations, converged = fine.solve(unknowns)

@@ -19,6 +19,8 @@ from calibration.local import on_panel
 from calibration.stripes import EdgeMap
 
 MINIMUM_POINTS = 30
+# Squared sine of the angle between two rays: a baseline of a millionth of the distance.
+_LEAST_PARALLAX = 1e-12
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,11 @@ def correspondences(decoded: Decoded, edges: tuple[EdgeMap, ...], step_px: int) 
 def triangulate(
     camera: Device, projector: Device, seen: Correspondences
 ) -> tuple[Float[np.ndarray, "points 3"], Float[np.ndarray, " points"]]:
-    """Points in the camera's frame [m] and the gap between the two rays of each [m]."""
+    """Points in the camera's frame [m] and the gap between the two rays of each [m].
+
+    Raises:
+        ImageError: camera and projector in one place.
+    """
     rotation, _ = cv2.Rodrigues(projector.rotation_rad)
     origin = -rotation.T @ projector.translation_m
     a = undistorted(camera, seen.camera_px)
@@ -74,6 +80,13 @@ def triangulate(
     aa, ab, bb = (np.einsum("ij,ij->i", u, v) for u, v in ((a, a), (a, b), (b, b)))
     ao, bo = a @ origin, b @ origin
     determinant = aa * bb - ab**2
+    if np.median(determinant / (aa * bb)) < _LEAST_PARALLAX:
+        raise ImageError(
+            "The rays of camera and projector are parallel: both stand in one place, or were calibrated so. "
+            "Move them apart by a tenth of the distance to the wall, and calibrate again."
+        )
+    # A lone parallel pair lands far away, where the plane's fit leaves it out.
+    determinant = np.maximum(determinant, _LEAST_PARALLAX * aa * bb)
     s = (bb * ao - ab * bo) / determinant
     t = (ab * ao - aa * bo) / determinant
     on_a, on_b = s[:, None] * a, origin + t[:, None] * b
@@ -81,7 +94,18 @@ def triangulate(
 
 
 def fit_plane(points_m: Float[np.ndarray, "points 3"]) -> Plane:
-    """The plane through the points, outliers (things in front of the wall) left out."""
+    """The plane through the points, outliers (things in front of the wall) left out.
+
+    Raises:
+        ImageError: fewer than three points, or points on one line.
+    """
+    if len(points_m) < 3:
+        raise ImageError(f"A wall of {len(points_m)} points; expected at least 3, better hundreds.")
+    spread = np.linalg.svd(points_m - points_m.mean(axis=0), compute_uv=False)
+    if not spread[1] > 1e-9 * spread[0]:
+        raise ImageError(
+            "The wall's points lie on a line, which holds no plane. Light and see more of the wall."
+        )
     plane = _least_squares(points_m, _consensus(points_m))
     for _ in range(10):
         distance = points_m @ plane.normal - plane.offset_m
