@@ -52,6 +52,12 @@ class ShiftOperator(Protocol):
         ...
 
 
+# Thinner air than at this temperature is none: without a limit 0 K comes next, and then less.
+_HOTTEST_K = 5000.0
+_NOT_AIR = (
+    "Some of the shifts are larger than air could make: the temperature is cut at 5000 K. Something else moved; "
+    "check the drift, and that both captures show the same pattern."
+)
 # A thousandth of a kelvin, as excess refractivity.
 _LEAST_SIZE = 1e-9
 _DRAWS = 4
@@ -133,7 +139,8 @@ def solve_temperature(
         )
     # Kelvin to excess refractivity at ambient: only scales weights, never values.
     per_k = air.ambient_refractivity / air.ambient_temperature_k
-    prior = _excess(air, prior_temperature(problem, grid) - air.ambient_temperature_k)
+    prior_k = prior_temperature(problem, grid)
+    prior = _excess(air, prior_k + _level_k(known, prior_k) - air.ambient_temperature_k)
     weights = tuple(data_weight(s, settings.representation) for s in problem.shifts)
     size = prior_size(operators, weights, problem.shifts, prior, grid, settings)
     # A room's worth of independent values: one a hundred vertices.
@@ -146,7 +153,9 @@ def solve_temperature(
     held = mass if problem.planes else 1e-3 * mass
     system = _System(grid, operators, weights, known, per_k, stiffness, held, slopes)
     n, iterations, settled = _minimise(system, problem.shifts, prior, air, settings, on_event)
-    temperature = air.ambient_refractivity * air.ambient_temperature_k / (n + air.ambient_refractivity)
+    index = n + air.ambient_refractivity
+    thinnest = air.ambient_refractivity * air.ambient_temperature_k / _HOTTEST_K
+    temperature = air.ambient_refractivity * air.ambient_temperature_k / np.maximum(index, thinnest)
     x, y, z = grid.axes_m
     return Solution(
         x_m=x,
@@ -159,8 +168,21 @@ def solve_temperature(
         notes=(
             "Temperature only: velocity and pressure are not solved for by this preset.",
             "What varies along the line of sight comes from the prior, not from the images.",
+            *([_NOT_AIR] if (index < thinnest).any() else []),
         ),
     )
+
+
+def _level_k(known: KnownTemperature, prior_k: Volume) -> float:
+    """What thermometers and outlets read above the prior, where no plane says how warm the room is.
+
+    Pictures do not see the level, and the prior's size is theirs: it must not pull the level to ambient.
+    """
+    if known.mask.any() or not known.means:
+        return 0.0
+    weights = np.array([std**-2 for _, _, std in known.means])
+    above = [kelvin - float(prior_k.reshape(-1)[members].mean()) for members, kelvin, _ in known.means]
+    return float(np.average(above, weights=weights))
 
 
 def prior_temperature(problem: Problem, grid: VertexGrid) -> Volume:

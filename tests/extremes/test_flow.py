@@ -119,10 +119,11 @@ def scored(name: str, run, expected) -> Row:
 
 
 def uncertain(name: str, derivative: float, covariance: float, difference: float, expected) -> Row:
+    """One parameter; two grids and two closures that differ alike."""
+
     def run() -> np.ndarray:
-        found = deviation(
-            [np.full((3, 3, 3), derivative)], np.array([[covariance]]), np.full((3, 3, 3), difference), 1.0
-        )
+        apart = np.full((3, 3, 3), difference)
+        found = deviation([np.full((3, 3, 3), derivative)], np.array([[covariance]]), (apart, apart), 1.0)
         return np.stack([found.std, found.informed])
 
     return Row(STAGE, f"deviation with {name}", run, expected)
@@ -155,10 +156,10 @@ ROWS = [
     scored("still air", lambda: float(score_velocity(0 * VECTORS, 0 * VECTORS, 0.5)["rel"] is None), Near(1.0)),
     scored("no flow found", lambda: score_velocity(0 * VECTORS, VECTORS, 0.5)["rel"], Near(1.0)),
     scored("a pressure of nothing", lambda: float(score_pressure(CUBE, 0 * CUBE)["rel"] is None), Near(1.0)),
-    uncertain("nothing measured", 1.0, 1.0, 0.0, Within(0.0, 1.1)),
-    uncertain("no parameter that matters", 0.0, 1.0, 0.0, Within(0.0, 0.1)),
+    uncertain("nothing measured", 1.0, 1.0, 0.0, Within(0.0, 2.0)),
+    uncertain("no parameter that matters", 0.0, 1.0, 0.0, Within(0.0, 1.0)),
     uncertain("1e-12 of variance left", 1.0, 1e-12, 0.0, Within(0.0, 1.0)),
-    uncertain("two grids 1e3 apart", 1.0, 1.0, 1e3, Within(0.0, 701.0)),
+    uncertain("grids and closures 1e3 apart", 1.0, 1.0, 1e3, Within(0.0, 3000.0)),
 ]  # fmt: skip
 
 
