@@ -9,7 +9,7 @@ from core.air import Air
 from core.boussinesq import Flow, Numbers, Scales, residuals, scales
 from core.grid import Staggered, StaggeredGrid, discrete_residuals
 from core.metrics import score_pressure, score_temperature, score_velocity
-from core.uncertainty import deviation
+from core.uncertainty import Represented, deviation
 from tests.extremes.row import Near, Refused, Row, Within, extremes, prove
 
 STAGE = "flow"
@@ -123,7 +123,8 @@ def uncertain(name: str, derivative: float, covariance: float, difference: float
 
     def run() -> np.ndarray:
         apart = np.full((3, 3, 3), difference)
-        found = deviation([np.full((3, 3, 3), derivative)], np.array([[covariance]]), (apart, apart), 1.0)
+        represented = Represented(apart, apart, 1.0, (0.5, 0.5, 0.05))
+        found = deviation([np.full((3, 3, 3), derivative)], np.array([[covariance]]), represented)
         return np.stack([found.std, found.informed])
 
     return Row(STAGE, f"deviation with {name}", run, expected)
