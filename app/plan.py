@@ -19,7 +19,7 @@ from core.displacement import resolve_window_px
 from core.metrics import departure, inner, rms
 from core.plan.choice import Choice
 from core.plan.choices import Resolution, resolve
-from core.plan.cost import Speed, Work, draft_work, grid_work, knows_walls, level_of, paper_work, room_work
+from core.plan.cost import Speed, Work, draft_work, grid_work, level_of, paper_work, room_work
 from core.plan.expected import ExpectedFlow, expected_flow
 from core.plan.measured import resolve_measured
 from core.plan.seen import seen
@@ -121,7 +121,7 @@ def preset_lines(
     for name, work in works.items():
         speed = speeds.get(name)
         needs_walls = name in ("standard", "reference")
-        fits = knows_walls(problem) or not needs_walls
+        fits = flow.step_s is not None or not needs_walls
         known = expected_error(name, level, light) if fits else None
         timed = (work, speed) if work is not None and speed is not None and fits else None
         lines.append(
@@ -141,7 +141,7 @@ def preset_lines(
 
 def _preset_reason(fits: bool, known: ExpectedError | None) -> str:
     if not fits:
-        return "needs the room's walls and what drives the air (an inlet or a heater) in the scene"
+        return "needs what drives the air: an inlet or a heater in the scene, or a plane with openings"
     if known is None:
         return "no reference room was solved with this knowledge and light"
     return f"error from {known.rooms} runs on reference rooms, times the expected departures"

@@ -46,3 +46,31 @@ def expected_error(preset: str, level: str, light: str) -> ExpectedError | None:
 def _median(fitting: list[dict[str, Any]], name: str) -> float | None:
     known = [r[name] for r in fitting if r.get(name) is not None]
     return float(np.median(known)) if known else None
+
+
+def front(rows: list[dict[str, Any]], quantity: str) -> list[dict[str, Any]]:
+    """Rows that no quicker row beats in `quantity`, by time."""
+    best: list[dict[str, Any]] = []
+    for row in sorted((r for r in rows if r.get(quantity) is not None), key=lambda r: r["solver_s"]):
+        if not best or row[quantity] < best[-1][quantity]:
+            best.append(row)
+    return best
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """The presets as a Markdown table: medians over rooms, one line a preset, level and light."""
+    lines = [
+        "| preset | information | light | solver | T error over departures | u error | p error | rooms |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    named = [row for row in rows if row["preset"]]
+    for key in dict.fromkeys((r["preset"], r["information"], r["light"]) for r in named):
+        own = [r for r in named if (r["preset"], r["information"], r["light"]) == key]
+        solver_s = float(np.median([r["solver_s"] for r in own]))
+        share = float(np.median([r["T_share"] for r in own]))
+        u, p = (_median(own, name) for name in ("u", "p"))
+        told = ["-" if value is None else f"{value:.2f}" for value in (u, p)]
+        lines.append(
+            f"| {' | '.join(key)} | {solver_s:.0f} s | {share:.2f} | {' | '.join(told)} | {len(own)} |"
+        )
+    return "\n".join(lines) + "\n"

@@ -15,6 +15,7 @@ import numpy as np
 
 from core.plan.expected import ExpectedFlow
 from core.problem import Problem
+from core.room.grid import WALLS
 from core.room.prior import room_prior
 from core.room.room import room
 from core.room.runs import RoomSettings
@@ -24,7 +25,8 @@ from core.solve.draft import draft_grid
 from core.solve.recipes import PAPER_STEPS
 from core.solve.room import closure_name
 
-Level = Literal["walls", "plane", "images"]
+# As `airlens simulate --information` names them; `images`: not even a plane.
+Level = Literal["surveyed", "operator", "paper", "images"]
 
 
 @dataclass(frozen=True)
@@ -79,17 +81,16 @@ def room_work(problem: Problem, flow: ExpectedFlow, settings: RoomSettings) -> W
     return Work(loops, float(np.prod(fine.grid.cells)))
 
 
-def knows_walls(problem: Problem) -> bool:
-    """Whether the scene states what drives the air and where its walls are: what a room needs."""
-    boundary = problem.scene.boundary
-    return any(isinstance(b, Inlet | Heater) for b in boundary) and any(isinstance(b, Wall) for b in boundary)
-
-
 def level_of(problem: Problem) -> Level:
-    """How much is known: walls and what drives the air, a plane, or little more than the images."""
-    if knows_walls(problem):
-        return "walls"
-    return "plane" if problem.planes else "images"
+    """How much is known: all walls and what drives the air, some of it, a plane, or the images alone."""
+    boundary = problem.scene.boundary
+    driven = any(isinstance(b, Inlet | Heater) for b in boundary)
+    walls = [b.thermal for b in boundary if isinstance(b, Wall)]
+    if driven and len(walls) == len(WALLS) and "unknown" not in walls:
+        return "surveyed"
+    if driven:
+        return "operator"
+    return "paper" if problem.planes else "images"
 
 
 def grid_work(problem: Problem) -> Work:
