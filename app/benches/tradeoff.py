@@ -49,11 +49,11 @@ POINTS = (
     Point("draft", 48, None, frames=10),
     Point("draft", 48, None, frames=1000),
     Point("draft", 48, "draft", light="projector"),
-    Point("grid", 16, None),
     Point("grid", 32, "grid"),
     Point("room", 24, None),
-    Point("room", 32, None),
     Point("room", 48, "standard"),
+    Point("room", 32, None),
+    Point("grid", 16, None),
 )
 INFORMATION = ("surveyed", "operator", "paper")
 

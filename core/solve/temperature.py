@@ -32,7 +32,7 @@ from core.air import Air
 from core.knowledge import KnownTemperature, VertexGrid, known_temperature, plane_on_grid, wall_index
 from core.problem import Problem, ShiftMeasurement
 from core.result import Outcome, Solution
-from core.scene import Scene
+from core.scene import ProjectedPattern, Scene
 from core.setting import SettingError, setting
 
 Volume = Float[np.ndarray, "nx ny nz"]
@@ -61,6 +61,8 @@ _NOT_AIR = (
 # A thousandth of a kelvin, as excess refractivity.
 _LEAST_SIZE = 1e-9
 _DRAWS = 4
+# Lit by a projector the shift is what is left of two larger ones, each with its representation error.
+_TWO_PATHS = 3.3
 
 
 @setting
@@ -141,7 +143,8 @@ def solve_temperature(
     per_k = air.ambient_refractivity / air.ambient_temperature_k
     prior_k = prior_temperature(problem, grid)
     prior = _excess(air, prior_k + _level_k(known, prior_k) - air.ambient_temperature_k)
-    weights = tuple(data_weight(s, settings.representation) for s in problem.shifts)
+    paths = _TWO_PATHS if isinstance(problem.scene.light, ProjectedPattern) else 1.0
+    weights = tuple(data_weight(s, paths * settings.representation) for s in problem.shifts)
     size = prior_size(operators, weights, problem.shifts, prior, grid, settings)
     # A room's worth of independent values: one a hundred vertices.
     mass = 0.01 / size**2
@@ -219,14 +222,21 @@ def prior_size(
     ]
     for operator, weight, shift in zip(operators, weights, shifts, strict=True):
         used = weight[:, 0, 0] > 0
-        rest = (shift.displacement_px - operator.apply(prior))[used]
-        seen += float(np.sum(rest**2))
-        noise += float(np.sum(np.linalg.inv(shift.information_per_px2[used]).trace(axis1=1, axis2=2)))
-        unit += float(np.mean([np.sum(operator.apply(d / d.std())[used] ** 2) for d in draws]))
+        spread = np.linalg.cholesky(np.linalg.inv(shift.information_per_px2[used]))
+        drawn = np.einsum("wab,wb->wa", spread, random.standard_normal((used.sum(), 2)))
+        noise += _most(drawn)
+        seen += _most((shift.displacement_px - operator.apply(prior))[used])
+        unit += float(np.mean([_most(operator.apply(d / d.std())[used]) for d in draws]))
     if unit == 0.0:
         return _LEAST_SIZE
     # No less than a tenth of what noise alone would look like: zero would forbid every departure.
     return max(float(np.sqrt(max(seen - noise, 0.01 * noise) / unit)), _LEAST_SIZE)
+
+
+def _most(shifts_px: Float[np.ndarray, "windows 2"]) -> float:
+    """Sum of squares without the largest tenth: thermal layers move the pattern more than the room's air."""
+    squares = np.sum(shifts_px**2, axis=1)
+    return float(squares[squares <= np.percentile(squares, 90)].sum()) if len(squares) else 0.0
 
 
 def _lengths_m(grid: VertexGrid, settings: TemperatureSettings) -> tuple[float, float, float]:
