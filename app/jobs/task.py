@@ -58,10 +58,10 @@ class Task:
         finite = {name: value if math.isfinite(value) else None for name, value in (values or {}).items()}
         self.tell("progress", {"step": step, "steps": steps, **finite})
 
-    def show(self, plane: Float32[np.ndarray, "across up"]) -> None:
-        """Show how a field stands now; at most once a second, and not kept: it is told, not promised."""
+    def show(self, plane: Float32[np.ndarray, "across up"], *, last: bool = False) -> None:
+        """Show how a field stands now; at most once a second but for the last, and not kept: told, not promised."""
         path = self.folder.attempt(self.owner.attempt) / PLANE_FILE
-        if not path.exists() or time.time() - path.stat().st_mtime >= SHOWN_EVERY_S:
+        if last or not path.exists() or time.time() - path.stat().st_mtime >= SHOWN_EVERY_S:
             temporary = path.with_suffix(".tmp.npy")
             np.save(temporary, np.asarray(plane, np.float32))
             temporary.replace(path)

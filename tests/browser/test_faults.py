@@ -88,7 +88,7 @@ def test_a_projector_that_falls_silent(station: Station, opens: Opens):
     services = station.app.state.services
     source = services.projector.report.source
     services.projector.open(source, lambda: ProjectorLink(EscVp21(), LoopPort(twin), clock=clock))
-    expect(page.locator(".side")).to_contain_text(
+    expect(page.locator(".projector")).to_contain_text(
         "The projector does not answer. Check its power and its cable"
     )
     expect(footer).to_contain_text("projector silent")

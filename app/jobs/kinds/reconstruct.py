@@ -69,4 +69,7 @@ def run(task: Task, settings: ReconstructSettings) -> dict[str, Any]:
     )
     if done.solution.outcome is Outcome.stopped:
         task.check_stop()
+    warm_k = done.solution.temperature_k
+    ambient_k = done.measurement.problem.scene.air.ambient_temperature_k
+    task.show((warm_k[:, warm_k.shape[1] // 2] - ambient_k).astype("float32"), last=True)
     return {"preset": settings.preset, "outcome": done.solution.outcome.name}

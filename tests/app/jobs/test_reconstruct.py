@@ -48,7 +48,7 @@ def test_a_job_gives_the_result_of_the_pipeline_bit_for_bit(experiment: Path, tm
     plane = np.load(folder.attempt(1) / PLANE_FILE)
     assert plane.shape == (found.temperature_k.shape[0], found.temperature_k.shape[2])
     final = found.temperature_k[:, found.temperature_k.shape[1] // 2]
-    assert np.corrcoef(plane.ravel(), final.ravel())[0, 1] > 0.8
+    assert np.corrcoef(plane.ravel(), final.ravel())[0, 1] > 0.999
 
 
 def test_a_stopped_job_leaves_no_result_and_an_order_without_experiment_is_refused(
