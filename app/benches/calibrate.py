@@ -43,7 +43,7 @@ TRIALS = {
     "draft": (Trial("draft", 24), Trial("draft", 48)),
     "standard": (Trial("standard", 20), Trial("standard", 30)),
     "grid": (Trial("grid", 16), Trial("grid", 32)),
-    "paper": (Trial("paper", 10), Trial("paper", 40)),
+    "paper": (Trial("paper", 1), Trial("paper", 2)),
 }
 
 
