@@ -133,13 +133,14 @@ class GuidedCalibration:
         step, plan = self._plan.step, self._plan
         if step in (StepName.camera, StepName.projector) and plan.board is None:
             raise BadInputError(
-                "The board is not known; give --grid and --square, or a [rig.board] table in experiment.toml."
+                "The board is not known. State it under Board on the page, by --grid and --square, or as "
+                "a [rig.board] table in experiment.toml."
             )
         record = self.record
         if step is StepName.projector and self._stage.display is None:
             raise BadInputError("This rig has no projector: its scene is lit otherwise.")
         if step is StepName.wall and record is None:
-            raise BadInputError("There is no calibrated camera yet; run 'airlens calibrate camera' first.")
+            raise BadInputError("There is no calibrated camera yet; take the step 'camera' first.")
         lit = record is not None and record.panel_size_px is not None
         if step is StepName.wall and self._stage.display is not None and not lit:
             raise BadInputError("Gray code on the wall needs a calibrated projector; calibrate that first.")

@@ -6,7 +6,7 @@ with Client("http://127.0.0.1:8765/#token=...") as airlens:
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
@@ -265,10 +265,14 @@ class Client:
         return _unpack(self._bytes(path, {"encoding": "f32"}))
 
     def change_experiment(
-        self, experiment: str, title: str | None = None, information: str | None = None
+        self,
+        experiment: str,
+        title: str | None = None,
+        information: str | None = None,
+        board: Mapping[str, Any] | None = None,
     ) -> ExperimentResource:
-        """Change title or notes."""
-        body = {"title": title, "information": information}
+        """Change title, notes, or the board to calibrate with: the fields of BoardGeometry."""
+        body = {"title": title, "information": information, "board": board}
         return self._ask(ExperimentResource, "PATCH", f"/experiments/{experiment}", body)
 
     def results(self, experiment: str) -> list[ResultLine]:

@@ -9,18 +9,29 @@ from jaxtyping import Float
 from app.api.problems import ApiError
 from app.api.services import Given
 from app.api.strict import Identifier, Strict
+from app.calibration_guide import StepName
+from app.calibration_parts import Part, PartState, bundle_of, is_calibrated, parts_of
 from app.experiment import Experiment
 from app.rehearsal import calibrate_simulated
-from calibration.bundle import Bundle, CalibratedOptics, from_json
+from calibration.bundle import Bundle, CalibratedOptics
 from core.geometry import Optics, Vector3
 
 router = APIRouter(tags=["calibrations"])
 
+# What each part is called, and what stands in for it.
+_WITHOUT = {
+    StepName.camera: ("camera", "The optics written in experiment.toml are used."),
+    StepName.projector: ("projector", "The optics written in experiment.toml are used."),
+    StepName.wall: ("back wall", "The rig stands in a frame of its own, not yet in the room."),
+    StepName.response: ("response", "The noise written in experiment.toml is used."),
+}
+
 
 class CalibrationItem(Strict):
-    """One thing that was calibrated, in words for the operator."""
+    """One thing to calibrate, in words for the operator: measured from images, given, or missing."""
 
     name: str
+    state: PartState
     value: str
     advice: str
 
@@ -35,9 +46,12 @@ class StandingResource(Strict):
 
 
 class CalibrationResource(Strict):
-    """The calibration of an experiment; `room_m` are the room's lower and upper corner."""
+    """The calibration of an experiment; `room_m` are the room's lower and upper corner.
 
-    state: Literal["calibrated"] = "calibrated"
+    Incomplete while a part that the rig needs is missing: camera, wall, and the projector where it is the light.
+    """
+
+    state: Literal["calibrated", "incomplete"]
     date: str | None
     items: list[CalibrationItem]
     room_m: list[list[float]]
@@ -52,7 +66,7 @@ class NewCalibration(Strict):
 
 @router.get("/experiments/{experiment}/calibration")
 def read_calibration(given: Given, experiment: Identifier) -> CalibrationResource:
-    """Return the calibration in use."""
+    """Return the calibration in use; of a rig that nobody has calibrated, that everything is missing."""
     return _resource(given.folders.open(experiment))
 
 
@@ -70,13 +84,12 @@ def calibrate(given: Given, experiment: Identifier, new: NewCalibration) -> Cali
 
 
 def _resource(experiment: Experiment) -> CalibrationResource:
-    if not experiment.bundle_path.is_file():
-        raise ApiError("not_found", "This experiment is not calibrated.", "Calibrate it.")
-    bundle = from_json(experiment.bundle_path.read_text(encoding="utf-8"))
+    bundle, parts = bundle_of(experiment), parts_of(experiment)
     room = experiment.settings.scene.room
     return CalibrationResource(
-        date=bundle.date,
-        items=_items(bundle),
+        state="calibrated" if is_calibrated(parts) else "incomplete",
+        date=bundle.date if experiment.bundle_path.is_file() else None,
+        items=[*_items(bundle), *(_missing(part) for part in parts if part.state == "missing")],
         room_m=[list(room.lower_m), list(room.upper_m)],
         rig=_rig(bundle, room.upper_m),
     )
@@ -124,12 +137,24 @@ def _items(bundle: Bundle) -> list[CalibrationItem]:
         x, y, z = bundle.wall.point_m
         plane = f"plane through ({x:.3f}, {y:.3f}, {z:.3f}) m"
         items.append(
-            CalibrationItem(name="back wall", value=plane, advice=_advice(bundle.wall.quality.advice))
+            CalibrationItem(
+                name="back wall",
+                state=bundle.wall.quality.source,
+                value=plane,
+                advice=_advice(bundle.wall.quality.advice),
+            )
         )
     for response in bundle.camera_responses:
         value = f"dark {response.dark_counts:.1f} counts, {response.bits} bit"
-        items.append(CalibrationItem(name=f"response of {response.name}", value=value, advice=""))
+        name, source = f"response of {response.name}", response.quality.source
+        items.append(CalibrationItem(name=name, state=source, value=value, advice=""))
     return items
+
+
+def _missing(part: Part) -> CalibrationItem:
+    name, standing = _WITHOUT[part.step]
+    advice = f"{standing} Take the step '{part.step}'{'' if part.needed else ' where noise matters'}."
+    return CalibrationItem(name=name, state="missing", value="not calibrated", advice=advice)
 
 
 def _optics(one: CalibratedOptics) -> CalibrationItem:
@@ -142,7 +167,10 @@ def _optics(one: CalibratedOptics) -> CalibrationItem:
         f"{100 * quality.coverage:.0f} % of the image covered"
     )
     return CalibrationItem(
-        name=one.name, value=f"focal length {focal_px:.1f} px; {known}", advice=_advice(quality.advice)
+        name=one.name,
+        state=quality.source,
+        value=f"focal length {focal_px:.1f} px; {known}",
+        advice=_advice(quality.advice),
     )
 
 

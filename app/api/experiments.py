@@ -6,8 +6,10 @@ from typing import Any, Literal
 from fastapi import APIRouter
 from pydantic import Field
 
+from app.api.board import BoardGeometry
 from app.api.services import Given
 from app.api.strict import Identifier, Strict
+from app.calibration_parts import is_calibrated, parts_of
 from app.configuration import to_plain
 from app.experiment import Experiment, finished, save_settings
 from app.plan_record import PLAN_FILE
@@ -18,7 +20,7 @@ router = APIRouter(tags=["experiments"])
 
 
 class ExperimentLine(Strict):
-    """One line of the list of experiments."""
+    """One line of the list of experiments; `uncalibrated` names the parts of the rig that need it still."""
 
     experiment: str
     title: str
@@ -27,6 +29,7 @@ class ExperimentLine(Strict):
     projector: bool
     light: Literal["texture", "projector"]
     calibrated: bool
+    uncalibrated: list[str]
     planned: bool
     captures: int
     results: int
@@ -50,10 +53,11 @@ class NewExperiment(Strict):
 
 
 class ExperimentChange(Strict):
-    """What people wrote about it."""
+    """What people wrote about it, and the board that its rig is calibrated with."""
 
     title: str | None = Field(default=None, max_length=200)
     information: str | None = Field(default=None, max_length=10_000)
+    board: BoardGeometry | None = None
 
 
 @router.get("/experiments")
@@ -78,14 +82,16 @@ def read_experiment(given: Given, experiment: Identifier) -> ExperimentResource:
 
 @router.patch("/experiments/{experiment}")
 def change_experiment(given: Given, experiment: Identifier, change: ExperimentChange) -> ExperimentResource:
-    """Change title or notes."""
+    """Change title, notes, or the board to calibrate with."""
     found = given.folders.open(experiment)
-    new = found.settings.model_copy(update=change.model_dump(exclude_none=True))
-    return _resource(save_settings(found.folder, new))
+    words = change.model_dump(exclude_none=True, exclude={"board"})
+    if change.board is not None:
+        words["rig"] = found.settings.rig.model_copy(update={"board": change.board.settings()})
+    return _resource(save_settings(found.folder, found.settings.model_copy(update=words)))
 
 
 def _line(experiment: Experiment) -> ExperimentLine:
-    settings = experiment.settings
+    settings, parts = experiment.settings, parts_of(experiment)
     changed_s = (experiment.folder / "experiment.toml").stat().st_mtime
     return ExperimentLine(
         experiment=experiment.folder.name,
@@ -94,7 +100,8 @@ def _line(experiment: Experiment) -> ExperimentLine:
         camera=settings.rig.camera.kind,
         projector=settings.rig.projector is not None,
         light="projector" if isinstance(settings.scene.light, ProjectedPattern) else "texture",
-        calibrated=experiment.bundle_path.is_file(),
+        calibrated=is_calibrated(parts),
+        uncalibrated=[part.step.value for part in parts if part.needed and part.state == "missing"],
         planned=(experiment.folder / PLAN_FILE).is_file(),
         captures=len(finished(experiment.captures_folder)),
         results=len(finished(experiment.results_folder)),

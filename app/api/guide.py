@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 from pydantic import Field
 
+from app.api.board import BoardGeometry
 from app.api.services import Given, Services
 from app.api.strict import Identifier, Strict
 from app.calibration_desk import GuideState
@@ -15,7 +16,6 @@ from app.calibration_state import state_of
 from app.conditions import Conditions
 from app.errors import BadInputError
 from app.experiment import Experiment
-from app.rig_settings import BoardSettings
 from calibration.board import Board
 from calibration.record import Placement
 
@@ -49,11 +49,13 @@ class GuideView(Strict):
 class GuideResource(Strict):
     """A guided calibration. While `state` is running, `done` of `total` pictures of `wanted` are taken.
 
+    `busy` is true also while another step, or another experiment's, takes pictures: none can be begun.
     `coverage` holds rows of cells from the picture's top left; `residuals_px` holds column, row, and the
     residual there, in pixels of a picture of `width_px` x `height_px`.
     """
 
     state: Literal["idle", "running", "failed"]
+    busy: bool
     step: StepText
     reason: str
     wanted: WantedResource | None
@@ -69,17 +71,6 @@ class GuideResource(Strict):
     rms_px: float | None
     residuals_px: list[tuple[float, float, float, float]]
     advice: list[str]
-
-
-class BoardGeometry(Strict):
-    """A board: inner corners of a chessboard, squares of a ChArUco board, circles."""
-
-    kind: Literal["chessboard", "charuco", "circles", "asymmetric-circles"] = "chessboard"
-    columns: int = Field(ge=2, le=200)
-    rows: int = Field(ge=2, le=200)
-    square_m: float = Field(gt=0, le=10)
-    marker_m: float | None = Field(default=None, gt=0, le=10)
-    dictionary: str = Field(default="DICT_5X5_250", max_length=40)
 
 
 class GuideRequest(Strict):
@@ -165,7 +156,7 @@ def _plan(experiment: Experiment, request: GuideRequest) -> LivePlan:
 def _board(experiment: Experiment, request: GuideRequest) -> Board | None:
     """The board of the request, else of the experiment."""
     if request.board is not None:
-        return BoardSettings(**request.board.model_dump()).board()
+        return request.board.settings().board()
     own = experiment.settings.rig.board
     return None if own is None else own.board()
 
@@ -182,6 +173,7 @@ def _resource(given: Services, experiment: Experiment, plan: LivePlan) -> GuideR
     state = state_of(CalibrationFolder(experiment.folder).record(plan.camera), plan.step)
     return GuideResource(
         state=status.state.value if own else "idle",
+        busy=status.state is GuideState.running,
         step=plan.step.value,
         reason=reason,
         wanted=None if wanted is None else _wanted(wanted),

@@ -72,11 +72,17 @@ def _validation(_request: Request, error: Exception) -> Response:
 
 
 def _bad_input(_request: Request, error: Exception) -> Response:
-    return respond(ApiError("bad_input", str(error)))
+    return respond(_in_its_words("bad_input", error))
 
 
 def _failed(_request: Request, error: Exception) -> Response:
-    return respond(ApiError("failed", str(error)))
+    return respond(_in_its_words("failed", error))
+
+
+def _in_its_words(code: str, error: Exception, next_step: str | None = None) -> ApiError:
+    """What an error says after its first sentence is what to do; `next_step` where it says no more."""
+    cause, _, what_to_do = str(error).partition(". ")
+    return ApiError(code, f"{cause}.", what_to_do) if what_to_do else ApiError(code, cause, next_step)
 
 
 def _unknown_job(_request: Request, error: Exception) -> Response:
@@ -93,9 +99,9 @@ def _unavailable(_request: Request, error: Exception) -> Response:
 
 def _device(_request: Request, error: Exception) -> Response:
     if isinstance(error, DeviceBusyError):
-        return respond(ApiError("conflict", str(error), "Close the other program, then reconnect."))
+        return respond(_in_its_words("conflict", error))
     code = "not_found" if isinstance(error, DeviceNotFoundError) else "device_failed"
-    return respond(ApiError(code, str(error), "Check cable and power, then reconnect the device."))
+    return respond(_in_its_words(code, error, "Check cable and power, then reconnect the device."))
 
 
 def _os(request: Request, error: Exception) -> Response:

@@ -8,6 +8,7 @@ export interface Experiment {
   projector: boolean;
   light: "texture" | "projector";
   calibrated: boolean;
+  uncalibrated: string[];
   planned: boolean;
   captures: number;
   results: number;
@@ -198,10 +199,23 @@ export interface Standing {
   corners_m: number[][];
 }
 
+export interface Board {
+  kind: "chessboard" | "charuco" | "circles" | "asymmetric-circles";
+  columns: number;
+  rows: number;
+  square_m: number;
+  marker_m: number | null;
+  dictionary: string;
+}
+
+export interface ExperimentWhole extends Experiment {
+  settings: { rig: { board?: Board | null } };
+}
+
 export interface Calibration {
-  state: string;
+  state: "calibrated" | "incomplete";
   date: string | null;
-  items: { name: string; value: string; advice: string }[];
+  items: { name: string; state: "measured" | "given" | "missing"; value: string; advice: string }[];
   room_m: number[][];
   rig: Standing[];
 }
@@ -219,6 +233,7 @@ export interface Wanted {
 
 export interface Guide {
   state: "idle" | "running" | "failed";
+  busy: boolean;
   step: string;
   reason: string;
   wanted: Wanted | null;

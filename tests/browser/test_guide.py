@@ -1,0 +1,42 @@
+"""The guided calibration on Calibrate: asked, taken, judged, forgotten, taken again, on to the next step."""
+
+import re
+
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import Opens, Station, snapshot
+
+
+def choose_step(page: Page, step: str) -> None:
+    page.get_by_role("button", name=re.compile(rf"\d\. {step}")).click()
+
+
+def test_a_calibration_is_guided_from_the_first_view_to_the_response(station: Station, opens: Opens):
+    watched = opens(station.address)
+    page = watched.page
+    page.locator("button.next").click()
+    expect(page.locator("button.next")).to_have_text("Calibrate")
+    page.get_by_role("button", name="Calibrate", exact=True).first.click()
+    views = page.locator("table.views tbody tr")
+    expect(page.locator(".wanted")).to_contain_text("Show the board in the middle")
+    page.get_by_role("button", name="Take", exact=True).click()
+    expect(views).to_have_count(1)
+    page.get_by_label("Go on by itself").check()
+    expect(views).to_have_count(12)
+    expect(page.locator(".wanted")).to_contain_text("Everything that this step asks for is taken")
+    snapshot(page, "guide-camera")
+    known = page.locator("section[aria-labelledby=known-title]")
+    expect(known).to_contain_text("Still to calibrate: wall.")
+    expect(known.get_by_role("row", name="back wall")).to_contain_text("not calibrated")
+    page.get_by_role("row", name="view_03.png").get_by_role("button", name="Retake").click()
+    expect(views).to_have_count(11)
+    page.get_by_role("button", name="Take", exact=True).click()
+    expect(views).to_have_count(12)
+    choose_step(page, "wall")
+    page.get_by_role("button", name="Take", exact=True).click()
+    expect(page.get_by_role("row", name="back wall")).to_contain_text("plane through")
+    choose_step(page, "response")
+    page.get_by_label("Go on by itself").check()
+    expect(page.get_by_role("row", name="response")).to_contain_text("dark")
+    snapshot(page, "guide-response")
+    assert watched.complaints == []
