@@ -106,7 +106,7 @@ def test_kill_9_in_the_middle_leaves_what_was_taken_marked_as_incomplete(tmp_pat
         [sys.executable, "-c", KILLED, str(folder), stack], cwd=Path(__file__).parents[2]
     )
     watched = folder / ("frames.tif" if stack == "raw" else "partial.tif")
-    deadline_s = time.monotonic() + 60
+    deadline_s = time.monotonic() + 200
     while not (watched.exists() and watched.stat().st_size > 1_000_000) and time.monotonic() < deadline_s:
         time.sleep(0.01)
     time.sleep(0.2)

@@ -49,7 +49,7 @@ def shown(screen, client, **answer):
 
 @pytest.fixture
 def kiosk():
-    screen = KioskScreen(timeout_s=5.0)
+    screen = KioskScreen(timeout_s=100.0)
     with serve_kiosk(screen) as url, httpx.Client(base_url=url.removesuffix("/kiosk/page")) as client:
         yield screen, client
 

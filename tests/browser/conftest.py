@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from fastapi import FastAPI
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from app.api import ServiceConfig, create_app
 from app.api.server import listen, serving
@@ -18,7 +18,11 @@ from app.jobs import JobsConfig, Supervisor
 
 CHROMIUM = shutil.which("chromium")
 PAGE = Path(__file__).resolve().parents[2] / "web" / "dist" / "index.html"
+# As slow as a machine may be: nothing here is a measurement of time.
+PATIENCE_MS = 100_000
 FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader", "--force-prefers-reduced-motion"]
+
+expect.set_options(timeout=PATIENCE_MS)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -60,7 +64,7 @@ class Station:
 
     def stop(self) -> None:
         self._stop.set()
-        self._thread.join(timeout=20)
+        self._thread.join(timeout=100)
         self._serving.__exit__(None, None, None)
 
 
@@ -111,6 +115,7 @@ def opens(chromium: Browser) -> Iterator[Opens]:
     def open_page(address: str, browser: Browser = chromium, **options) -> Watched:
         context = browser.new_context(**{"viewport": {"width": 1280, "height": 900}} | options)
         contexts.append(context)
+        context.set_default_timeout(PATIENCE_MS)
         page = context.new_page()
         complaints: list[str] = []
         page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)

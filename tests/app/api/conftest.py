@@ -29,7 +29,7 @@ class Live:
         return {"Authorization": f"Bearer {self.token}"}
 
     def client(self) -> httpx.Client:
-        return httpx.Client(base_url=self.url, headers=self.bearer, timeout=30)
+        return httpx.Client(base_url=self.url, headers=self.bearer, timeout=100)
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ def viewer(live: Live) -> ClientConnection:
 
 
 def read(socket: ClientConnection) -> tuple[dict, np.ndarray]:
-    message = socket.recv(timeout=5)
+    message = socket.recv(timeout=60)
     assert isinstance(message, bytes)
     length = int.from_bytes(message[:4], "big")
     jpeg = np.frombuffer(message[4 + length :], np.uint8)

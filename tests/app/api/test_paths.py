@@ -63,7 +63,7 @@ def test_known_tricks_find_nothing(root: Path, name: str):
 @pytest.mark.parametrize("name", KNOWN)
 def test_the_service_answers_tricks_with_a_problem(live: Live, name: str):
     paths = [f"/api/experiments/{quote(name, safe='')}", f"/api/experiments/x/results/{quote(name)}"]
-    with contextlib.closing(http.client.HTTPConnection("127.0.0.1", live.port, timeout=10)) as connection:
+    with contextlib.closing(http.client.HTTPConnection("127.0.0.1", live.port, timeout=100)) as connection:
         for path in paths:
             connection.request("GET", path, headers=live.bearer)
             answer = connection.getresponse()

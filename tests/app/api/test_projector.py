@@ -32,7 +32,7 @@ def experiment(client: Client) -> str:
     return client.create_experiment(camera_px=64, light="projector").experiment
 
 
-def until(client: Client, state: str, limit_s: float = 20.0) -> None:
+def until(client: Client, state: str, limit_s: float = 100.0) -> None:
     deadline_s = time.monotonic() + limit_s
     while client.projector().state != state:
         assert time.monotonic() < deadline_s, client.projector()

@@ -27,12 +27,12 @@ def test_serve_prints_an_address_whose_token_opens_the_service(tmp_path: Path):
             base, token = started["address"].split("/#token=")
             command_line = Path(f"/proc/{process.pid}/cmdline").read_bytes()
             assert token.encode() not in command_line
-            answer = httpx.get(f"{base}/api/about", headers={"Authorization": f"Bearer {token}"})
+            answer = httpx.get(f"{base}/api/about", headers={"Authorization": f"Bearer {token}"}, timeout=100)
             assert answer.json()["data_root"] == str(tmp_path)
-            assert httpx.get(f"{base}/api/about").status_code == 401
+            assert httpx.get(f"{base}/api/about", timeout=100).status_code == 401
         finally:
             process.send_signal(signal.SIGINT)
-            process.wait(timeout=20)
+            process.wait(timeout=100)
     assert (tmp_path / "service" / "token").stat().st_mode & 0o077 == 0
 
 
