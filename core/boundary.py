@@ -11,16 +11,18 @@ from jaxtyping import Float
 from core.boussinesq import Flow
 from core.geometry import WallName
 from core.grid.interpolation import interpolation_matrix
-from core.losses import BoundaryLoss, Patch, PointLoss
+from core.losses import BoundaryLoss, MeanLoss, Patch, PointLoss
 from core.problem import PlaneData, Problem, SensorData
-from core.representation import Span, Spans, positions
+from core.representation import Span, Spans, points_of, positions
 from core.scene import Heater, Inlet, Outlet, Wall
 from core.scene import Patch as WallPatch
 from core.setting import SettingError
-from core.solve.frame import Frame
+from core.solve.frame import Frame, measured_outlets
 
-# A wall temperature or velocity counts fully; an outlet's mean is one thermometer over many points.
-_OUTLET_WEIGHT = 0.1
+# A reading that is one standard deviation off weighs this much against the losses, which are means of squares.
+_READING = 0.01
+# Where no plane or sensor is known an outlet alone fixes the level of T: ten times as much.
+_ONLY_READING = 0.1
 
 
 def boundary_loss(problem: Problem, frame: Frame, *, weight: float, points_an_axis: int) -> BoundaryLoss:
@@ -56,6 +58,23 @@ def point_losses(problem: Problem, frame: Frame) -> tuple[PointLoss, ...]:
         weight = Flow(jnp.zeros(1), jnp.full(1, 0.01), jnp.zeros((1, 3)))
         losses.append(PointLoss(centre, _zeros((1,)), weight, name="gauge"))
     return tuple(losses)
+
+
+def level_loss(problem: Problem, frame: Frame, points_an_axis: int) -> MeanLoss | None:
+    """The outlets' mean temperatures on walls whose plane is not known; None where there are none."""
+    known = {plane.wall for plane in problem.planes}
+    outlets = [found for found in measured_outlets(problem) if found[0].patch.wall not in known]
+    if not outlets:
+        return None
+    say = _READING if problem.planes or problem.sensors else _ONLY_READING
+    points, target, weight = [], [], []
+    for outlet, kelvin in outlets:
+        spans, axes = _wall_spans(outlet.patch.wall, frame, points_an_axis)
+        inside = _inside(outlet.patch, spans, axes, frame).ravel()
+        points.append(jnp.asarray(points_of(spans)[inside], jnp.float32))
+        target.append((kelvin - frame.scales.reference_k) / frame.scales.excess_k)
+        weight.append(say * abs(frame.scales.excess_k) / outlet.temperature_std_k)
+    return MeanLoss(tuple(points), jnp.array(target, jnp.float32), jnp.array(weight, jnp.float32))
 
 
 def _plane(plane: PlaneData, frame: Frame, n: int) -> Patch:
@@ -134,9 +153,9 @@ def _patch(item: Inlet | Outlet | Heater, frame: Frame, n: int) -> Patch:
             target = _values(shape, frame, item.temperature_k)
             weight = _masked(inside, temperature=1.0, pressure=0.0, velocity=1.0)
         case Outlet():
-            known = item.mean_temperature_k is not None
-            target = _values(shape, frame, item.mean_temperature_k or frame.scales.reference_k)
-            weight = _masked(inside, temperature=_OUTLET_WEIGHT * known, pressure=1.0, velocity=0.0)
+            # The patch's mean temperature is a row of its own: it is not each point's.
+            target = _values(shape, frame, frame.scales.reference_k)
+            weight = _masked(inside, temperature=0.0, pressure=1.0, velocity=0.0)
     return Patch(spans, target, weight)
 
 
@@ -156,10 +175,9 @@ def _sensors(sensor: SensorData, frame: Frame) -> PointLoss:
         jnp.zeros(len(points)),
         jnp.asarray(np.where(u_known, sensor.velocity_m_s, 0.0), jnp.float32),
     )
-    # In units of a hundredth of the scales, as a reading with its sigma weighs against a mean of squares.
-    t_weight = np.where(t_known, 0.01 * abs(frame.scales.excess_k) / sensor.temperature_std_k, 0.0)
+    t_weight = np.where(t_known, _READING * abs(frame.scales.excess_k) / sensor.temperature_std_k, 0.0)
     u_std = np.where(np.isfinite(sensor.velocity_std_m_s), sensor.velocity_std_m_s, 1.0)[:, None]
-    u_weight = np.where(u_known, 0.01 * frame.scales.velocity_m_s / u_std, 0.0)
+    u_weight = np.where(u_known, _READING * frame.scales.velocity_m_s / u_std, 0.0)
     weight = Flow(
         jnp.asarray(np.nan_to_num(t_weight), jnp.float32),
         jnp.zeros(len(points)),

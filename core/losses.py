@@ -143,6 +143,20 @@ class PointLoss(eqx.Module):
         return _errors(fields.at(self.points_nd), self.target, self.weight)
 
 
+class MeanLoss(eqx.Module):
+    """The mean temperature over scattered points, over its standard deviation: an outlet's thermometer."""
+
+    points_nd: tuple[Float[Array, "points 3"], ...]
+    target: Float[Array, " means"]
+    weight: Float[Array, " means"]
+    name: str = eqx.field(static=True, default="level")
+
+    def rows(self, fields: Fields, unknowns: Unknowns, key: PRNGKeyArray | None) -> Rows:
+        """One row a mean, always: they are few."""
+        found = jnp.stack([fields.at(points).temperature.mean() for points in self.points_nd])
+        return (self.weight * (found - self.target),)
+
+
 class SmoothnessLoss(eqx.Module):
     """Mean square slope of T's departure from `expected`, over the slopes that a room has.
 

@@ -3,10 +3,11 @@
 import json
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
+from app.bench_options import AsJson, Out, Volume
 from app.durable import durable_path
 from app.room_scene import Information, RigOptions
 from app.score import score_solution
@@ -36,9 +37,9 @@ def register(bench: typer.Typer) -> None:
 
 
 def draft(
-    volume: Annotated[Path, typer.Argument(help="Room volume (NPZ) that is the truth.")],
-    out: Annotated[Path, typer.Option(help="Folder for draft.jsonl.")] = Path("bench"),
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON line a case.")] = False,
+    volume: Volume,
+    out: Out = Path("bench"),
+    as_json: AsJson = False,
 ) -> None:
     """T beside the trivial answer, with a printed and with a projected pattern."""
     truth = read_volume(volume)

@@ -10,12 +10,12 @@ from typing import Annotated, Any
 
 import typer
 
+from app.bench_options import AsJson, Batch, Information, Layers, Out, Volume, Width, network
 from app.durable import durable_path
 from app.room_scene import RigOptions
 from app.score import score_solution
 from app.synthetic_problem import synthetic_problem
 from app.truth import RoomVolume, read_volume
-from core.mlp import MlpSettings
 from core.problem import Problem
 from core.result import Solution
 from core.solve.grid import GridSettings, solve_grid
@@ -30,30 +30,25 @@ def register(bench: typer.Typer) -> None:
 
 
 def reconstruct(
-    volume: Annotated[Path, typer.Argument(help="Room volume (NPZ) that is the truth.")],
-    out: Annotated[Path, typer.Option(help="Folder for lines.jsonl and curves.png.")] = Path("bench"),
-    information: Annotated[str, typer.Option(help="paper, operator or surveyed.")] = "paper",
+    volume: Volume,
+    out: Out = Path("bench"),
+    information: Information = "paper",
     light: Annotated[str, typer.Option(help="texture or projector.")] = "texture",
     regime: Annotated[str, typer.Option(help="A list of losses, joined by +.")] = "bos+pde+boundary",
     cells: Annotated[int, typer.Option(help="Cells an axis of the grid.")] = 32,
     network_s: Annotated[float, typer.Option(help="Seconds for the network.")] = 120.0,
-    layers: Annotated[int, typer.Option(help="Hidden layers.")] = 4,
-    width: Annotated[int, typer.Option(help="Width of a layer.")] = 128,
-    batch: Annotated[int, typer.Option(help="Collocation points a step; the paper's is 8192.")] = 8192,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON line a point.")] = False,
+    layers: Layers = 4,
+    width: Width = 128,
+    batch: Batch = 8192,
+    as_json: AsJson = False,
 ) -> None:
     """Error against time of `grid` and `mlp` on one volume, in one run."""
     truth = read_volume(volume)
     options = RigOptions(light=light)  # type: ignore[arg-type]
     problem = synthetic_problem(truth, options, information, window_px=32, seed=0)  # type: ignore[arg-type]
     lines = run_grid(problem, truth, regime, cells)  # type: ignore[arg-type]
-    network = MlpSolveSettings(
-        regime=regime,  # type: ignore[arg-type]
-        network=MlpSettings(hidden_layers=layers, width=width),
-        collocation_points=batch,
-        loop=LoopSettings(record_every=20, time_limit_s=network_s),
-    )
-    lines += run_network(problem, truth, network)
+    loop = LoopSettings(record_every=20, time_limit_s=network_s)
+    lines += run_network(problem, truth, network(regime, layers, width, batch, loop))
     _write(out, lines, truth, information, light)
     for line in [*lines, _ratio(lines)]:
         typer.echo(json.dumps(line) if as_json else "  ".join(f"{k} {v}" for k, v in line.items()))

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from app.bench_options import AsJson, Batch, Information, Out, Volume, Width, network
 from app.benches.reconstruct import errors, trivial
 from app.durable import durable_path
 from app.errors import BadInputError
@@ -19,12 +20,11 @@ from app.paper_setup import paper_problem
 from app.room_scene import RigOptions
 from app.synthetic_problem import synthetic_problem
 from app.truth import RoomVolume, read_volume
-from core.mlp import MlpSettings
 from core.problem import Problem
 from core.result import Solution
 from core.solve.grid import GridSettings, solve_grid
 from core.solve.loop import LoopSettings
-from core.solve.mlp import MlpSolveSettings, solve_mlp
+from core.solve.mlp import solve_mlp
 from core.solve.regime import REGIMES, Regime
 
 
@@ -34,18 +34,19 @@ def register(bench: typer.Typer) -> None:
 
 
 def regimes(
-    volume: Annotated[Path, typer.Argument(help="Room volume (NPZ) that is the truth.")],
-    out: Annotated[Path, typer.Option(help="Folder for the JSON lines and the pictures.")] = Path("bench"),
+    volume: Volume,
+    out: Out = Path("bench"),
     setup: Annotated[str, typer.Option(help="paper, texture or projector.")] = "paper",
-    information: Annotated[str, typer.Option(help="paper, operator or surveyed.")] = "paper",
+    information: Information = "paper",
     method: Annotated[str, typer.Option(help="grid or mlp.")] = "grid",
     cells: Annotated[int, typer.Option(help="Cells an axis of the grid.")] = 64,
     network_steps: Annotated[int, typer.Option(help="Steps of the network, for each regime.")] = 500,
-    width: Annotated[int, typer.Option(help="Width of the network's four layers.")] = 128,
-    batch: Annotated[int, typer.Option(help="Collocation points a step; the paper's is 8192.")] = 8192,
+    limit_s: Annotated[float | None, typer.Option(help="Seconds for each regime.")] = None,
+    width: Width = 128,
+    batch: Batch = 8192,
     rays: Annotated[str, typer.Option(help="grid, or network: as published, sixty times slower.")] = "grid",
     only: Annotated[list[str] | None, typer.Option("--regime", help="One regime; again for more.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON line a regime.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Each regime of losses on one volume: errors of T, p, u, and pictures of truth, prediction and error."""
     truth = read_volume(volume)
@@ -56,9 +57,14 @@ def regimes(
     chosen: list[Regime] = [regime for regime in REGIMES if not only or str(regime) in only]
     for regime in chosen:
         began = time.process_time()
-        found[regime] = _solve(
-            problem, regime, method, cells, MlpSettings(width=width), batch, rays, network_steps
-        )
+        if method == "grid":
+            found[regime] = solve_grid(
+                problem,
+                GridSettings(regime=regime, cells=cells, coarsest=min(cells, 16), time_limit_s=limit_s),
+            )
+        else:
+            loop = LoopSettings(steps=network_steps, time_limit_s=limit_s)
+            found[regime] = solve_mlp(problem, network(regime, 4, width, batch, loop, rays))
         cpu_s = round(time.process_time() - began, 1)
         point = {"setup": setup, "information": information, "method": method, "regime": regime}
         cost = {"solver_s": round(found[regime].solver_s, 1), "cpu_s_with_compilation": cpu_s}
@@ -81,31 +87,6 @@ def _problem(truth: RoomVolume, setup: str, information: str) -> Problem:
             "paper, operator or surveyed."
         )
     return synthetic_problem(truth, RigOptions(light=setup), information, window_px=32, seed=0)  # type: ignore[arg-type]
-
-
-def _solve(
-    problem: Problem,
-    regime: Regime,
-    method: str,
-    cells: int,
-    network: MlpSettings,
-    batch: int,
-    rays: str,
-    network_steps: int,
-) -> Solution:
-    if method == "grid":
-        return solve_grid(problem, GridSettings(regime=regime, cells=cells, coarsest=min(cells, 16)))
-    share = batch / 8192
-    settings = MlpSolveSettings(
-        regime=regime,
-        network=network,
-        rays=rays,  # type: ignore[arg-type]
-        collocation_points=batch,
-        pixels=round(5000 * share),
-        boundary_points=round(4096 * share),
-        loop=LoopSettings(steps=network_steps),
-    )
-    return solve_mlp(problem, settings)
 
 
 def _iterations(found: Solution) -> int:

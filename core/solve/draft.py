@@ -11,7 +11,8 @@ from core.rays.operator import StraightRayOperator, build
 from core.result import Solution
 from core.scene import Scene
 from core.solve.check import check_problem
-from core.solve.temperature import OnEvent, TemperatureSettings, solve_temperature
+from core.solve.temperature import OnEvent, solve_temperature
+from core.solve.temperature_prior import TemperatureSettings
 
 _apply = jax.jit(lambda operator, values: operator.apply(values))
 _transpose = jax.jit(lambda operator, shift: operator.transpose(shift))

@@ -64,18 +64,19 @@ def frame_of(problem: Problem) -> Frame:
 def height_profile(problem: Problem, frame: Frame, spans: Spans) -> Flow:
     """Median over y of T and p on a known plane across x or y, carried through the room.
 
-    Without a plane the temperature of the air that leaves, where an outlet knows it; else zero.
+    Without a plane the temperature of the air that leaves, where an outlet knows it, with the pressure of
+    that column: started without it the first step takes the buoyancy out of T instead of building p.
     """
     shape = tuple(span[2] for span in spans)
     temperature = np.zeros(shape, np.float32)
     pressure = np.zeros(shape, np.float32)
-    leaving = [
-        item.mean_temperature_k
-        for item in problem.scene.boundary
-        if isinstance(item, Outlet) and item.mean_temperature_k is not None
-    ]
+    leaving = measured_outlets(problem)
     if leaving:
-        temperature += (np.mean(leaving) - frame.scales.reference_k) / frame.scales.excess_k
+        level_k = float(np.mean([kelvin for _, kelvin in leaving]))
+        level = (level_k - frame.scales.reference_k) / frame.scales.excess_k
+        above = positions(spans[2]) - float(np.mean([_height(outlet, frame) for outlet, _ in leaving]))
+        temperature += level
+        pressure += frame.numbers.richardson * level * above
     upright = [plane for plane in problem.planes if plane.wall[0] in "xy"]
     if upright:
         plane, scales = upright[0], frame.scales
@@ -86,6 +87,24 @@ def height_profile(problem: Problem, frame: Frame, spans: Spans) -> Flow:
             np.interp(z_m, plane.second_m, np.median(plane.pressure_m2_s2, axis=0)) / scales.pressure_m2_s2
         )
     return Flow(jnp.asarray(temperature), jnp.asarray(pressure), jnp.zeros((*shape, 3)))
+
+
+def measured_outlets(problem: Problem) -> list[tuple[Outlet, float]]:
+    """The outlets whose mean temperature is known, with it."""
+    return [
+        (item, item.mean_temperature_k)
+        for item in problem.scene.boundary
+        if isinstance(item, Outlet) and item.mean_temperature_k is not None
+    ]
+
+
+def _height(outlet: Outlet, frame: Frame) -> float:
+    """Of the patch's middle, where p is zero: nondimensional."""
+    room, patch = frame.room, outlet.patch
+    if patch.wall[0] == "z":
+        return frame.upper[2] if patch.wall == "z_max" else frame.lower[2]
+    middle_m = (patch.lower_m[1] + patch.upper_m[1]) / 2
+    return (middle_m - room.lower_m[2]) / frame.scales.length_m
 
 
 def _numbers(flow: FlowModel, problem: Problem, found: Scales) -> Numbers:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from core.boundary import boundary_loss, point_losses
+from core.boundary import boundary_loss, level_loss, point_losses
 from core.image_rows import rendered_rows, warped_rows
 from core.losses import Loss, PhysicsLoss, PriorLoss, SmoothnessLoss
 from core.problem import Problem, ShiftMeasurement
@@ -86,6 +86,9 @@ def losses_of(
     if boundary.patches:
         losses.append(boundary)
     losses += point_losses(problem, frame)
+    level = level_loss(problem, frame, wall_points)
+    if level is not None:
+        losses.append(level)
     if "pde" in regime:
         losses.append(PhysicsLoss(frame.numbers, frame.lower, frame.upper, weights.pde, weights.gamma))
     if data.drift_std_px is not None or problem.scene.flow.transport == "learned":
