@@ -70,11 +70,21 @@ def level_loss(problem: Problem, frame: Frame, points_an_axis: int) -> MeanLoss 
     points, target, weight = [], [], []
     for outlet, kelvin in outlets:
         spans, axes = _wall_spans(outlet.patch.wall, frame, points_an_axis)
+        spans = _inwards(spans, outlet.patch.wall, frame, points_an_axis)
         inside = _inside(outlet.patch, spans, axes, frame).ravel()
         points.append(jnp.asarray(points_of(spans)[inside], jnp.float32))
         target.append((kelvin - frame.scales.reference_k) / frame.scales.excess_k)
         weight.append(say * abs(frame.scales.excess_k) / outlet.temperature_std_k)
     return MeanLoss(tuple(points), jnp.array(target, jnp.float32), jnp.array(weight, jnp.float32))
+
+
+def _inwards(spans: Spans, wall: WallName, frame: Frame, n: int) -> Spans:
+    """Half a cell of the grid inside: air that leaves has no layer, and nothing else holds a grid's ghosts."""
+    axis = "xyz".index(wall[0])
+    step = (frame.upper[axis] - frame.lower[axis]) / (n - 1) * (1 if wall.endswith("min") else -1)
+    moved = list(spans)
+    moved[axis] = (spans[axis][0] + step, spans[axis][0] + step, 1)
+    return _triple(moved)
 
 
 def _plane(plane: PlaneData, frame: Frame, n: int) -> Patch:

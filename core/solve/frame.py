@@ -74,9 +74,8 @@ def height_profile(problem: Problem, frame: Frame, spans: Spans) -> Flow:
     if leaving:
         level_k = float(np.mean([kelvin for _, kelvin in leaving]))
         level = (level_k - frame.scales.reference_k) / frame.scales.excess_k
-        above = positions(spans[2]) - float(np.mean([_height(outlet, frame) for outlet, _ in leaving]))
         temperature += level
-        pressure += frame.numbers.richardson * level * above
+        pressure += frame.numbers.richardson * level * (positions(spans[2]) - outlet_height(problem, frame))
     upright = [plane for plane in problem.planes if plane.wall[0] in "xy"]
     if upright:
         plane, scales = upright[0], frame.scales
@@ -96,6 +95,12 @@ def measured_outlets(problem: Problem) -> list[tuple[Outlet, float]]:
         for item in problem.scene.boundary
         if isinstance(item, Outlet) and item.mean_temperature_k is not None
     ]
+
+
+def outlet_height(problem: Problem, frame: Frame) -> float:
+    """Where p is zero: the mean height of the outlets' middles, nondimensional; the floor without any."""
+    outlets = [item for item in problem.scene.boundary if isinstance(item, Outlet)]
+    return float(np.mean([_height(outlet, frame) for outlet in outlets])) if outlets else frame.lower[2]
 
 
 def _height(outlet: Outlet, frame: Frame) -> float:

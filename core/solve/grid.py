@@ -24,10 +24,11 @@ from core.result import Outcome, Solution
 from core.setting import SettingError, setting
 from core.solve.check import check_problem
 from core.solve.checkpoint import CheckpointStore, configuration_hash, encode, newest, restore
-from core.solve.frame import Frame, frame_of, height_profile
+from core.solve.frame import Frame, frame_of
 from core.solve.gauss_newton import Step, column_scale, gauss_newton_step
 from core.solve.regime import DataModel, Regime, Weights, losses_of
 from core.solve.solution import solution_of
+from core.solve.start import starting_flow
 
 OnEvent = Callable[[dict[str, Any]], object]
 
@@ -115,12 +116,12 @@ def solve_grid(
 
 
 def initial_unknowns(problem: Problem, frame: Frame, settings: GridSettings) -> Unknowns:
-    """Still air, T and p of the known plane's height profile (ambient without one), on the coarsest grid."""
+    """Still air in balance, as warm as what is known, on the coarsest grid."""
     grid = StaggeredGrid(frame.lower, frame.upper, _cubic(settings.coarsest))
     multigrid = zero_multigrid(grid)
     spans = frame.vertices(_cubic(settings.coarsest + 1))
     x, y, z = (positions(span) for span in spans)
-    state = grid.of_fields((x, y, z), height_profile(problem, frame, spans))
+    state = grid.of_fields((x, y, z), starting_flow(problem, frame, spans, settings.regime))
     levels = (*multigrid.levels[:-1], state)
     drift = None
     if settings.data.drift_std_px is not None and problem.shifts:
