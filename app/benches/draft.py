@@ -5,29 +5,37 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import typer
 
 from app.bench_options import AsJson, Out, Volume
 from app.durable import durable_path
 from app.room_scene import Information, RigOptions
-from app.score import score_solution
+from app.score import score_solution, values_at
 from app.synthetic_problem import synthetic_problem
-from app.truth import read_volume
+from app.truth import RoomVolume, read_volume
+from core.metrics import inner, rms
+from core.problem import Problem
+from core.result import Solution
 from core.solve.check import check_problem
 from core.solve.draft import solve_draft
+from core.solve.frame import measured_outlets
 
-# The default rig at each level of information; the projector where the plane is known, far away as in the
-# paper and as near as a room allows.
+# The default rig at each level of information; the projector far away as in the paper and as near as a room
+# allows, with and without the plane.
+_FAR = ("projector, 30.5 m, 1 m aside", RigOptions(light="projector"))
+_NEAR = (
+    "projector, 4 m, 1 m aside and up",
+    RigOptions(light="projector", stand_off_m=4.0, baseline_m=(1.0, 1.0)),
+)
 CASES: tuple[tuple[str, RigOptions, Information], ...] = (
     ("texture", RigOptions(), "paper"),
     ("texture", RigOptions(), "operator"),
     ("texture", RigOptions(), "surveyed"),
-    ("projector, 30.5 m, 1 m aside", RigOptions(light="projector"), "paper"),
-    (
-        "projector, 4 m, 1 m aside and up",
-        RigOptions(light="projector", stand_off_m=4.0, baseline_m=(1.0, 1.0)),
-        "paper",
-    ),
+    (*_FAR, "paper"),
+    (*_FAR, "operator"),
+    (*_NEAR, "paper"),
+    (*_NEAR, "operator"),
 )
 
 
@@ -58,6 +66,8 @@ def draft(
             "T_departure": round(scores["departure_of_departures"], 4),
             "inlet_plane_K": round(scores["trivial"]["inlet_plane"], 4),
             "y_mean_K": round(scores["trivial"]["y_mean"], 4),
+            "outlet_K": _outlet_everywhere_k(problem, truth),
+            "within_2_std": _within(found, truth),
             "solver_s": round(found.solver_s, 2),
             "cpu_s": round(cpu_s, 2),
             "outcome": found.outcome.name,
@@ -66,3 +76,19 @@ def draft(
         typer.echo(json.dumps(line) if as_json else "  ".join(f"{k} {v}" for k, v in line.items()))
     with durable_path(out / "draft.jsonl") as path:
         path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+
+
+def _outlet_everywhere_k(problem: Problem, truth: RoomVolume) -> float | None:
+    """What costs nothing without a plane: the air that leaves, everywhere."""
+    leaving = measured_outlets(problem)
+    if not leaving:
+        return None
+    return round(float(rms(inner(truth.temperature_k) - leaving[0][1])), 4)
+
+
+def _within(found: Solution, truth: RoomVolume) -> float | None:
+    """Share of the room's inner vertices that lie within two stated deviations."""
+    if found.temperature_std_k is None:
+        return None
+    error = np.abs(values_at(truth, found, found.temperature_k) - truth.temperature_k)
+    return round(float(np.mean(inner(error < 2 * values_at(truth, found, found.temperature_std_k)))), 3)
