@@ -100,7 +100,7 @@ def test_the_volume_opens_in_vtk_with_equal_values(done, experiment, tmp_path):
 
 def test_the_csv_has_a_row_a_vertex_with_units_in_its_header(done, experiment, tmp_path):
     lines = export(experiment, "csv", tmp_path / "air.csv").read_text().splitlines()
-    assert lines[0] == "x [m],y [m],z [m],T [K]"
+    assert lines[0] == "x [m],y [m],z [m],T [K],T_std [K]"
     assert len(lines) == done.solution.temperature_k.size + 1
     first = done.solution.temperature_k[0, 0, 0]
     assert float(lines[1].split(",")[3]) == pytest.approx(first, rel=1e-6)
@@ -108,7 +108,7 @@ def test_the_csv_has_a_row_a_vertex_with_units_in_its_header(done, experiment, t
 
 def test_the_report_is_one_offline_file_with_every_picture(done):
     page = (done.folder / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 4
+    assert page.count("data:image/png;base64,") == 5
     assert "http://" not in page
     assert "https://" not in page
     for words in ("What the camera saw", "Against the truth", "What was assumed", "sha256"):

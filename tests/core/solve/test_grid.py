@@ -13,21 +13,9 @@ from core.setting import SettingError
 from core.solve.checkpoint import newest
 from core.solve.grid import GridSettings, solve_grid
 from core.solve.regime import Weights
+from tests.core.solve.memory import Memory
 
 SETTINGS = GridSettings(cells=8, coarsest=4, steps_a_level=3, cg_iterations=15, settled=0.0)
-
-
-class Memory:
-    """Checkpoints in memory, newest first."""
-
-    def __init__(self):
-        self.kept = []
-
-    def save(self, content):
-        self.kept.insert(0, content)
-
-    def load(self):
-        return self.kept
 
 
 def problem(sensor_std_k=0.5):

@@ -15,19 +15,7 @@ from core.result import Outcome
 from core.setting import SettingError
 from core.solve.checkpoint import decode, encode, newest
 from core.solve.loop import LoopSettings, LoopState, run
-
-
-class Memory:
-    """Checkpoints in memory, newest first."""
-
-    def __init__(self):
-        self.kept = []
-
-    def save(self, content):
-        self.kept.insert(0, content)
-
-    def load(self):
-        return self.kept
+from tests.core.solve.memory import Memory
 
 
 def noisy_bowl(unknowns, data, key):
