@@ -150,7 +150,7 @@ class CalibrationDesk:
             with self._live.using():
                 yield stage
             return
-        if self._live.status.source != name or self._live.status.state.value != "ready":
+        if self._live.status.experiment != name or self._live.status.state.value != "ready":
             self._live.open(name, lambda: open_camera(experiment, "still"))
         panel = panel_of(experiment.settings.scene)
         with self._live.using() as camera:

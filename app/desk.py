@@ -121,7 +121,7 @@ class CaptureDesk:
     def _connect(self, experiment: Experiment, air: AirState) -> None:
         """Open the rig's camera unless it is; a simulated room is told what its air does."""
         source = experiment.folder.name
-        open_for = (self._live.status.source, self._live.air)
+        open_for = (self._live.status.experiment, self._live.air)
         simulated = experiment.settings.rig.camera.kind == "simulated"
         if self._live.status.state.value != "ready" or open_for != (
             source,

@@ -12,7 +12,7 @@ from enum import StrEnum
 from typing import Any
 
 from app.live_view import LiveFrame, jpeg_of, statistics_of
-from drivers.errors import DeviceBusyError, DeviceError, DeviceNotFoundError, FrameError
+from drivers.errors import DeviceBusyError, DeviceError, DeviceNotFoundError, DeviceSettingError, FrameError
 from drivers.protocols import Camera, Frame
 
 LONGEST_RATE_HZ = 30.0
@@ -36,7 +36,7 @@ class CameraStatus:
     """What is known of the camera; settings are read back from it."""
 
     state: CameraState
-    source: str | None = None
+    experiment: str | None = None
     name: str | None = None
     width_px: int | None = None
     height_px: int | None = None
@@ -78,7 +78,7 @@ class LiveCamera:
         """The present state."""
         return self._status
 
-    def open(self, source: str, make: Callable[[], Camera], air: str = "still") -> CameraStatus:
+    def open(self, experiment: str, make: Callable[[], Camera], air: str = "still") -> CameraStatus:
         """Open (or open again) the camera that `make` returns; `air` is what a simulated room does.
 
         Raises DeviceError when it fails.
@@ -87,16 +87,16 @@ class LiveCamera:
             raise DeviceBusyError("The camera is taking a capture. Wait for its end, or abort it.")
         self.close()
         self.air, self.newest = air, None
-        self._change(CameraStatus(CameraState.opening, source))
+        self._change(CameraStatus(CameraState.opening, experiment))
         try:
             camera = make()
         except Exception as error:
-            self._change(CameraStatus(CameraState.failed, source, reason=str(error)))
+            self._change(CameraStatus(CameraState.failed, experiment, reason=str(error)))
             raise
         with self._use:
             self._camera = camera
             self._generation += 1
-        self._change(_status_of(camera, CameraState.ready, source))
+        self._change(_status_of(camera, CameraState.ready, experiment))
         self._thread = threading.Thread(
             target=self._run, args=(camera, self._generation), name="live-camera", daemon=True
         )
@@ -131,18 +131,20 @@ class LiveCamera:
         if self._status.state is CameraState.capturing:
             raise DeviceBusyError("The camera is taking a capture. Wait for its end, or abort it.")
         with self._use:
-            camera, source = self._camera, self._status.source
+            camera, experiment = self._camera, self._status.experiment
             if camera is None:
                 raise DeviceNotFoundError("No camera is open. Connect the rig of an experiment first.")
-            self._change(_status_of(camera, state, source))
+            self._change(_status_of(camera, state, experiment))
             try:
                 yield camera
+            except DeviceSettingError:
+                raise  # a value that it refuses leaves the camera as it was
             except DeviceError as error:
                 self._fail(error)
                 raise
             finally:
                 if self._status.state is not CameraState.failed and self._camera is camera:
-                    self._change(_status_of(camera, CameraState.ready, source))
+                    self._change(_status_of(camera, CameraState.ready, experiment))
 
     def show(self, frame: Frame) -> None:
         """Show a frame to whoever looks; captures call it with theirs, so that the picture stays alive."""
@@ -213,7 +215,7 @@ class LiveCamera:
 
     def _fail(self, error: DeviceError) -> None:
         self._generation += 1
-        self._change(CameraStatus(CameraState.failed, self._status.source, reason=str(error)))
+        self._change(CameraStatus(CameraState.failed, self._status.experiment, reason=str(error)))
 
     def _change(self, status: CameraStatus) -> None:
         told = status.state is not self._status.state or status.reason != self._status.reason
@@ -222,11 +224,11 @@ class LiveCamera:
             self._tell("device", {"device": "camera", "state": status.state.value, "reason": status.reason})
 
 
-def _status_of(camera: Camera, state: CameraState, source: str | None) -> CameraStatus:
+def _status_of(camera: Camera, state: CameraState, experiment: str | None) -> CameraStatus:
     info = camera.info
     return CameraStatus(
         state,
-        source,
+        experiment,
         info.name,
         info.width_px,
         info.height_px,

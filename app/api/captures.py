@@ -16,7 +16,6 @@ from app.api.strict import Identifier, Strict
 from app.api.volumes import Encoding, pack
 from app.capture import load_capture
 from app.capture_files import BurstImage
-from app.desk import DeskStatus
 from app.durable import write_text
 from app.experiment import read_manifest
 from drivers.burst import CapturePlan
@@ -101,13 +100,13 @@ class CaptureChange(Strict):
 @router.get("/captures/running")
 async def read_desk(given: Given) -> DeskResource:
     """Return the capture that is being taken, or the last one."""
-    return _desk(given.desk.status)
+    return DeskResource.of(given.desk.status)
 
 
 @router.post("/captures/running/abort")
 def abort_capture(given: Given, wanted: Abort) -> DeskResource:
     """End the running capture within a frame."""
-    return _desk(given.desk.abort(wanted.discard))
+    return DeskResource.of(given.desk.abort(wanted.discard))
 
 
 @router.post("/experiments/{experiment}/captures", status_code=202)
@@ -121,7 +120,7 @@ def start_capture(given: Given, experiment: Identifier, new: NewCapture) -> Desk
         settle_s=new.settle_s,
         raw_stack=new.raw_stack,
     )
-    return _desk(given.desk.start(given.folders.open(experiment), plan))
+    return DeskResource.of(given.desk.start(given.folders.open(experiment), plan))
 
 
 @router.get("/experiments/{experiment}/captures")
@@ -238,17 +237,3 @@ def _interrupted(folder: Path) -> CaptureResource:
 def _notes(folder: Path) -> str:
     path = folder / NOTES
     return path.read_text(encoding="utf-8") if path.is_file() else ""
-
-
-def _desk(status: DeskStatus) -> DeskResource:
-    return DeskResource(
-        state=status.state.value,
-        experiment=status.experiment,
-        capture=status.capture,
-        role=status.role,
-        done=status.done,
-        total=status.total,
-        refused=status.refused,
-        level=status.level,
-        reason=status.reason,
-    )

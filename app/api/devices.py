@@ -15,7 +15,7 @@ from app.api.projector import ProjectorResource, projector_resource
 from app.api.services import Given, services_of
 from app.api.strict import Strict
 from app.api.viewer import Viewer
-from app.live import CameraState, CameraStatus
+from app.live import CameraState
 from app.live_view import LiveFrame
 from app.rig import open_camera
 
@@ -67,13 +67,13 @@ class Asked(Strict):
 @router.get("/devices")
 async def list_devices(given: Given) -> list[CameraResource | ProjectorResource]:
     """List the devices and their states."""
-    return [_resource(given.camera.status), projector_resource(given.projector.report)]
+    return [CameraResource.of(given.camera.status), projector_resource(given.projector.report)]
 
 
 @router.get("/devices/camera")
 async def read_camera(given: Given) -> CameraResource:
     """Return the camera's state and its settings as read back."""
-    return _resource(given.camera.status)
+    return CameraResource.of(given.camera.status)
 
 
 @router.post("/devices/camera/connect")
@@ -81,19 +81,19 @@ def connect_camera(given: Given, wanted: OpenCamera) -> CameraResource:
     """Connect, or reconnect, the camera of an experiment's rig."""
     experiment = given.folders.open(wanted.experiment)
     status = given.camera.open(wanted.experiment, lambda: open_camera(experiment, wanted.air), wanted.air)
-    return _resource(status)
+    return CameraResource.of(status)
 
 
 @router.post("/devices/camera/disconnect")
 def disconnect_camera(given: Given) -> CameraResource:
     """Let the camera go, for another program."""
-    return _resource(given.camera.close())
+    return CameraResource.of(given.camera.close())
 
 
 @router.patch("/devices/camera")
 def change_camera(given: Given, change: CameraChange) -> CameraResource:
     """Set exposure and gain; the answer holds what the camera granted."""
-    return _resource(given.camera.set(change.exposure_s, change.gain))
+    return CameraResource.of(given.camera.set(change.exposure_s, change.gain))
 
 
 @router.get("/devices/camera/frame", response_class=Response, responses=JPEG_BODY)
@@ -173,18 +173,3 @@ def _numbers(frame: LiveFrame) -> str:
         "histogram": seen.histogram,
     }
     return json.dumps(numbers)
-
-
-def _resource(status: CameraStatus) -> CameraResource:
-    return CameraResource(
-        state=status.state.value,
-        experiment=status.source,
-        name=status.name,
-        width_px=status.width_px,
-        height_px=status.height_px,
-        bits=status.bits,
-        frame_rate_hz=status.frame_rate_hz,
-        exposure_s=status.exposure_s,
-        gain=status.gain,
-        reason=status.reason,
-    )

@@ -15,7 +15,7 @@ from app.errors import AirlensError, BadInputError
 from app.jobs import EngineError, JobError, LedgerError, UnknownJobError
 from calibration.errors import CalibrationError
 from core.setting import SettingError
-from drivers.errors import DeviceBusyError, DeviceError, DeviceNotFoundError
+from drivers.errors import DeviceBusyError, DeviceError, DeviceNotFoundError, DeviceSettingError
 
 CODES = {
     HTTPStatus.NOT_FOUND: "not_found",
@@ -100,6 +100,8 @@ def _unavailable(_request: Request, error: Exception) -> Response:
 def _device(_request: Request, error: Exception) -> Response:
     if isinstance(error, DeviceBusyError):
         return respond(_in_its_words("conflict", error))
+    if isinstance(error, DeviceSettingError):
+        return respond(_in_its_words("bad_input", error))
     code = "not_found" if isinstance(error, DeviceNotFoundError) else "device_failed"
     return respond(_in_its_words(code, error, "Check cable and power, then reconnect the device."))
 

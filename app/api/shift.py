@@ -31,7 +31,7 @@ class ShiftResource(Strict):
 @router.get("/devices/camera/shift")
 def read_shift(given: Given) -> ShiftResource:
     """Compare one frame of the connected camera with the newest reference of its experiment."""
-    frame, experiment = _frame(given), given.folders.open(given.camera.status.source or "")
+    frame, experiment = _frame(given), given.folders.open(given.camera.status.experiment or "")
     folder = experiment.latest_capture("reference")
     reference = load_capture(folder).images[0].mean
     seen = frame.pixels.astype(np.float32) / np.float32(frame.full_scale_counts)

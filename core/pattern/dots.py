@@ -2,7 +2,6 @@
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import oaconvolve
 
 from core.scene import DotPattern
 
@@ -14,6 +13,9 @@ def random_dots(pattern: DotPattern, rows: int, cols: int) -> Float[np.ndarray, 
 
     For a coverage c the number of dots is -ln(1 - c) / dot area per pixel, so that overlaps are paid for.
     """
+    # Imported here: it takes a second, at every start of the service and of every command.
+    from scipy.signal import oaconvolve
+
     rng = np.random.default_rng(pattern.seed)
     margin = int(np.ceil(pattern.diameter_px)) + 1
     shape = (rows + 2 * margin, cols + 2 * margin)

@@ -9,7 +9,7 @@ import pytest
 
 from app.live import CameraState, LiveCamera
 from app.live_view import jpeg_of, statistics_of
-from drivers.errors import DeviceBusyError, DeviceNotFoundError
+from drivers.errors import DeviceBusyError, DeviceNotFoundError, DeviceSettingError
 from drivers.protocols import Frame
 from drivers.simulated import CameraFault, SimulatedCamera
 
@@ -71,6 +71,9 @@ def test_settings_are_read_back():
     camera = opened([])
     assert camera.set(exposure_s=0.01, gain=2.0).exposure_s == 0.01
     assert camera.status.gain == 2.0
+    with pytest.raises(DeviceSettingError, match="expected 1 to 16"):
+        camera.set(exposure_s=None, gain=100.0)
+    assert (camera.status.state, camera.status.gain) == (CameraState.ready, 2.0)
     camera.close()
 
 

@@ -40,7 +40,7 @@ def go_to(page: Page, name: str) -> None:
 def test_a_camera_that_is_unplugged_during_a_burst(station: Station, opens: Opens):
     page = connected(station, opens)
     services = station.app.state.services
-    source = services.camera.status.source
+    source = services.camera.status.experiment
 
     def faulty() -> SimulatedCamera:
         return SimulatedCamera(

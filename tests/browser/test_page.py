@@ -70,7 +70,7 @@ def test_an_unplugged_camera_is_told_and_one_click_reconnects_it(station: Statio
     page.locator("button.next").click()
     expect(page.locator("button.next")).to_have_text("Calibrate")
     services = station.app.state.services
-    experiment = services.camera.status.source
+    experiment = services.camera.status.experiment
 
     def faulty() -> SimulatedCamera:
         return SimulatedCamera(lambda: SCENE, seed=1, faults=lambda n: CameraFault.UNPLUG if n == 9 else None)

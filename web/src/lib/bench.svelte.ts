@@ -194,9 +194,11 @@ class Bench {
       return step(`Taking the ${role}: ${done} of ${total}`, "Capture", nothing, true);
     }
     if (!this.current?.calibrated) {
-      if (this.current?.camera === "simulated") return step("Calibrate", "Calibrate", () => this.calibrate());
-      // A real rig is calibrated by its operator: the way leads to the guide, which says what to show.
-      return step(`Calibrate the ${this.current?.uncalibrated[0] ?? "rig"}`, "Calibrate", nothing, this.page === "Calibrate");
+      const first = this.current?.uncalibrated[0] ?? "rig";
+      if (this.current?.camera === "simulated" && first === "camera")
+        return step("Calibrate", "Calibrate", () => this.calibrate());
+      // A real rig, or one that was begun with, is calibrated by its operator: the guide says what to show.
+      return step(`Calibrate the ${first}`, "Calibrate", nothing, this.page === "Calibrate");
     }
     if (!has("reference")) return step("Take the reference", "Capture", () => this.capture("reference", 100));
     if (!has("flow")) return step("Take the flow", "Capture", () => this.capture("flow", 100));

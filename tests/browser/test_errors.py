@@ -1,0 +1,70 @@
+"""What the service refuses is shown on every page in its own words, with what to do next."""
+
+import re
+import shutil
+
+from playwright.sync_api import Page, expect
+
+from app.client import Client
+from tests.browser.conftest import Opens, Station
+from tests.browser.test_faults import go_to
+from tests.browser.test_look import keep, room
+
+
+def told(page: Page, *words: str) -> None:
+    """The one place for refusals says so; then it is put away."""
+    alert = page.get_by_role("alert")
+    for part in words:
+        expect(alert).to_contain_text(part)
+    alert.get_by_role("button", name="Dismiss").click()
+    expect(alert).to_have_count(0)
+
+
+def test_every_page_shows_a_refusal_in_the_services_words(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=64).experiment
+        client.connect_camera(name)
+        client.calibrate(name)
+    experiment = station.app.state.services.folders.open(name)
+    keep(experiment, "20260101T000000-standard", room(), "standard", 1.0)
+    page = opens(station.address).page
+
+    page.get_by_label("Gain").fill("100")
+    page.get_by_role("button", name="Set", exact=True).click()
+    told(page, "Gain 100 is not possible; expected 1 to 16.")
+    expect(page.locator("footer")).to_contain_text("camera ready")
+
+    go_to(page, "Calibrate")
+    page.locator("details.board summary").click()
+    page.get_by_label("Kind").select_option("charuco")
+    page.get_by_label("Side of a marker [mm]").fill("200")
+    page.get_by_role("button", name="Keep the board").click()
+    told(page, "The markers are 0.2 m in squares of 0.1 m", "Measure the print and give both in metres.")
+
+    go_to(page, "Plan")
+    page.locator("main form input").first.fill("9000")
+    page.locator("main form").evaluate("form => { form.noValidate = true }")
+    page.locator("main form").get_by_role("button", name="Plan").click()
+    told(page, "excess_k", "Correct the")
+
+    go_to(page, "Look")
+    expect(page.locator(".slice canvas").first).to_have_attribute("data-painted", re.compile(r"\d"))
+    shutil.rmtree(experiment.results_folder)
+    page.get_by_role("button", name="CSV", exact=True).click()
+    told(page, "has no result", "List the parent resource to see what there is.")
+
+    go_to(page, "Rig")
+    page.get_by_role("button", name="Disconnect", exact=True).click()
+    expect(page.locator("footer")).to_contain_text("camera closed")
+    go_to(page, "Capture")
+    page.get_by_role("button", name="Take reference").click()
+    told(page, "No camera is open. Connect the rig of an experiment first.")
+
+
+def test_a_job_that_cannot_begin_says_why_in_the_queue(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=64).experiment
+        page = opens(station.address).page
+        go_to(page, "Reconstruct")
+        client.submit_job("reconstruct", {"preset": "draft"}, experiment=name, title="Too early")
+    expect(page.locator(".queue")).to_contain_text("has no finished reference capture. Take one:")
