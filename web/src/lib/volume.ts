@@ -34,6 +34,10 @@ export interface Scene3d {
   close(): void;
 }
 
+// Voxels from sample to sample along a ray, finest first; the first that is fast enough is kept.
+const STRIDES = [1.5, 2.2, 3.2] as const;
+const SMOOTH_MS = 90;
+
 export function createScene(place: HTMLElement): Scene3d {
   const view = vtkGenericRenderWindow.newInstance({ background: [0.08, 0.09, 0.11], listenWindowResize: false });
   view.setContainer(place as HTMLDivElement);
@@ -57,13 +61,16 @@ export function createScene(place: HTMLElement): Scene3d {
   frame.getProperty().setColor(0.6, 0.65, 0.7);
   let scale: Scale = { low: 0, high: 1, signed: false };
   let loaded = false;
+  let stride = 0;
+  let voxel_m = 1;
 
   function load(values: Numbers, velocity: Numbers[] | null, axes: Grid["axes"], wanted: Scale): void {
     scale = wanted;
     const image = imageOf(values, axes);
     const colours = colourFunction(scale);
     volumeMapper.setInputData(image);
-    volumeMapper.setSampleDistance(1.5 * Math.min(...image.getSpacing()));
+    voxel_m = Math.min(...image.getSpacing());
+    volumeMapper.setSampleDistance((stride || STRIDES[0]) * voxel_m);
     volume.getProperty().setRGBTransferFunction(0, colours);
     volume.getProperty().setScalarOpacity(0, opacityFunction(scale));
     volume.getProperty().setInterpolationTypeToLinear();
@@ -94,9 +101,28 @@ export function createScene(place: HTMLElement): Scene3d {
     const colour: number[] = [0, 0, 0];
     colourFunction(scale).getColor(value, colour as [number, number, number]);
     surface.getProperty().setColor(colour[0]!, colour[1]!, colour[2]!);
+    if (!stride && modes.volume) pace();
     const began_ms = performance.now();
     window3d.render();
     place.dataset["frameMs"] = (performance.now() - began_ms).toFixed(1);
+  }
+
+  /** Choose the finest stride that this machine draws smoothly: without a graphics card a frame costs as much as its samples. */
+  function pace(): void {
+    window3d.render(); // compiles the shaders
+    for (stride of STRIDES) {
+      volumeMapper.setSampleDistance(stride * voxel_m);
+      const began_ms = performance.now();
+      window3d.render();
+      finish();
+      if (performance.now() - began_ms <= SMOOTH_MS) return;
+    }
+  }
+
+  /** Wait until everything is really drawn: reading one pixel does. */
+  function finish(): void {
+    const gl = place.querySelector("canvas")?.getContext("webgl2");
+    gl?.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
   async function picture(): Promise<string> {
