@@ -41,7 +41,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
     on_stage("march the expected flow coarsely")
     flow = expected_flow(problem, excess_k)
     on_stage("noise and signal of each view")
-    signals = _signals(problem, flow)
+    signals = signals_of(problem, flow)
     on_stage("what the views determine")
     determined = seen(problem, flow, signals)
     on_stage("resolve the choices")
@@ -61,7 +61,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
             both=determined.both,
         ),
         choices=choice_lines(resolution),
-        presets=preset_lines(problem, flow, machine.speeds, windows=[_windows(s) for s in signals]),
+        presets=preset_lines(problem, flow, machine.speeds, windows=[windows_of(s) for s in signals]),
         machine=source,
         verdicts=[
             *(
@@ -147,7 +147,8 @@ def _preset_reason(fits: bool, known: ExpectedError | None) -> str:
     return f"error from {known.rooms} runs on reference rooms, times the expected departures"
 
 
-def _signals(problem: Problem, flow: ExpectedFlow) -> tuple[Signal, ...]:
+def signals_of(problem: Problem, flow: ExpectedFlow) -> tuple[Signal, ...]:
+    """Signal and noise of every view."""
     scene = problem.scene
     return tuple(
         signal(scene, n, flow, shift_noise(scene, n, resolve_window_px(scene, view)))
@@ -155,7 +156,8 @@ def _signals(problem: Problem, flow: ExpectedFlow) -> tuple[Signal, ...]:
     )
 
 
-def _windows(found: Signal) -> int:
+def windows_of(found: Signal) -> int:
+    """How many windows a view will measure."""
     return len(found.shift.centres_px) * found.shift.stride**2
 
 

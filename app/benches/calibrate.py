@@ -5,9 +5,8 @@ its cost model (`core.plan.cost`). Kept in the user's cache folder.
 """
 
 import json
-import multiprocessing
+import os
 import platform
-import resource
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from app.alone import alone
 from app.machine import Machine, keep_machine, machine_path
 from app.rehearsal import SAMPLE_ROOM
 from core.plan.cost import Speed, Work
@@ -59,7 +59,7 @@ def calibrate(
     """Measure this machine once, a few minutes, so that plans predict time and memory."""
     speeds: dict[str, Speed] = {}
     for preset, trials in TRIALS.items():
-        costs = [alone(trial) for trial in trials]
+        costs = [cost_of(trial) for trial in trials]
         for trial, cost in zip(trials, costs, strict=True):
             line = {"preset": preset, "size": trial.size, "work": cost.work.loops, "solver_s": cost.solver_s}
             line["memory_mb"] = cost.memory_mb
@@ -69,7 +69,7 @@ def calibrate(
     speeds["reference"] = speeds["standard"]
     path = out or machine_path()
     machine = Machine(
-        name=f"{platform.machine()}, {multiprocessing.cpu_count()} cores",
+        name=f"{platform.machine()}, {os.cpu_count()} cores",
         measured=datetime.now(UTC).date().isoformat(),
         speeds=speeds,
     )
@@ -91,20 +91,18 @@ def line_through(small: Cost, large: Cost) -> Speed:
     )
 
 
-def alone(trial: Trial) -> Cost:
-    """Run one trial in a fresh process, so that memory and compilation are its own."""
-    context = multiprocessing.get_context("spawn")
-    with context.Pool(1) as pool:
-        return pool.apply(run, (trial,))
+def cost_of(trial: Trial) -> Cost:
+    """One trial in a fresh process."""
+    (work, solver_s), memory_mb = alone(run, trial)
+    return Cost(work, solver_s, memory_mb)
 
 
-def run(trial: Trial) -> Cost:
+def run(trial: Trial) -> tuple[Work, float]:
     """Solve the packaged room; the work is counted as the plan will count it."""
     work, solve = PREPARE[trial.preset](trial.size)
     began = time.perf_counter()
     solve()
-    solver_s = time.perf_counter() - began
-    return Cost(work, solver_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    return work, time.perf_counter() - began
 
 
 Prepared = tuple[Work, Callable[[], object]]

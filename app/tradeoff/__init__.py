@@ -57,6 +57,30 @@ def front(rows: list[dict[str, Any]], quantity: str) -> list[dict[str, Any]]:
     return best
 
 
+def span(rows: list[dict[str, Any]], quantity: str) -> float:
+    """Solver seconds of the dearest row on the front over those of the cheapest."""
+    best = front(rows, quantity)
+    return best[-1]["solver_s"] / best[0]["solver_s"] if best else 0.0
+
+
+def off_front(rows: list[dict[str, Any]], preset: str, quantity: str) -> float | None:
+    """A preset's error over the best that any row of its room, knowledge and light has in that time.
+
+    The median over its runs: 1 is on the front. None where the preset has no such row.
+    """
+    distances = []
+    for row in rows:
+        if row["preset"] == preset and row.get(quantity) is not None:
+            rivals = [r for r in rows if r.get(quantity) is not None and _alike(r, row)]
+            best = min(r[quantity] for r in rivals if r["solver_s"] <= row["solver_s"])
+            distances.append(row[quantity] / best)
+    return float(np.median(distances)) if distances else None
+
+
+def _alike(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    return all(one[name] == other[name] for name in ("room", "information", "light"))
+
+
 def table(rows: list[dict[str, Any]]) -> str:
     """The presets as a Markdown table: medians over rooms, one line a preset, level and light."""
     lines = [

@@ -5,7 +5,7 @@ from typing import Any
 
 # A choice may cost the shift a tenth of one window's noise.
 SHARE = 0.1
-# A bound from a sample is doubled for what the sample missed.
+# A bound from a leading term is doubled for the terms left out.
 SAFETY = 2.0
 
 

@@ -27,7 +27,7 @@ Volume = Float[np.ndarray, "nx ny nz"]
 
 # Without any statement about the air: what a person or a computer makes.
 DEFAULT_EXCESS_K = 10.0
-_COARSE = RoomSettings(coarse_cells=20, settle_s=60.0)
+_COARSE = RoomSettings(coarse_cells=20, settle_s=180.0)
 _VERTICES = 33
 COURANT = 0.45
 

@@ -2,13 +2,19 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.benches.calibrate import Cost, line_through
 from app.errors import BadInputError
 from app.machine import Machine, keep_machine, read_machine, this_machine
 from app.presets import PRESETS
-from app.tradeoff import expected_error, front, rows, table
+from app.ray_sweep import traced
+from app.rehearsal import SAMPLE_ROOM
+from app.room_scene import RigOptions, room_scene
+from app.synthetic_problem import fine_field
+from app.tradeoff import expected_error, front, off_front, rows, span, table
+from app.truth import read_volume
 from core.plan.cost import Speed, Work
 
 README = Path(__file__).resolve().parents[2] / "README.md"
@@ -71,3 +77,37 @@ def test_figures_that_are_none_are_refused(tmp_path):
     path.write_text("{", encoding="utf-8")
     with pytest.raises(BadInputError, match="bench calibrate"):
         read_machine(path)
+
+
+def test_off_the_front_is_judged_among_alike():
+    alike = {"room": "A", "information": "paper", "light": "texture"}
+    sweep = [
+        {**alike, "preset": None, "solver_s": 1.0, "u": 0.4},
+        {**alike, "preset": "slow", "solver_s": 200.0, "u": 0.5},
+        {**alike, "preset": "best", "solver_s": 300.0, "u": 0.1},
+        {**alike, "room": "B", "preset": None, "solver_s": 1.0, "u": 0.01},
+    ]
+    assert off_front(sweep, "slow", "u") == pytest.approx(1.25)
+    assert off_front(sweep, "best", "u") == 1.0
+    assert off_front(sweep, "unknown", "u") is None
+    assert span(sweep[:3], "u") == 300.0
+
+
+def test_the_committed_front_is_wide_and_the_presets_lie_on_it():
+    kept = rows()
+    assert span(kept, "T_share") >= 100
+    for preset in ("draft", "standard"):
+        distance = off_front(kept, preset, "T_share")
+        assert distance is not None
+        assert distance <= 1.2
+
+
+def test_more_steps_cost_more_operations_and_come_nearer():
+    volume = read_volume(SAMPLE_ROOM)
+    scene = room_scene(volume, RigOptions(camera_px=(256, 192)), "paper")
+    pixels = np.stack(np.meshgrid(np.arange(48.0, 208.0, 16), np.arange(48.0, 144.0, 16)), -1).reshape(-1, 2)
+    field = fine_field(volume, scene)
+    few, many, most = (traced(scene, field, pixels, "straight", n, 1) for n in (16, 64, 256))
+    assert few.operations < many.operations < most.operations
+    assert many.off_px(most) < few.off_px(most)
+    assert most.off_px(most) == 0.0
