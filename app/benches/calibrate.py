@@ -40,8 +40,8 @@ class Cost:
 
 
 TRIALS = {
-    "draft": (Trial("draft", 24), Trial("draft", 48)),
-    "standard": (Trial("standard", 20), Trial("standard", 30)),
+    "draft": (Trial("draft", 48), Trial("draft", 96)),
+    "standard": (Trial("standard", 24), Trial("standard", 36)),
     "grid": (Trial("grid", 16), Trial("grid", 32)),
     "paper": (Trial("paper", 1), Trial("paper", 2)),
 }

@@ -1,6 +1,5 @@
 """The grid's descent: resumed, stopped and broken in the middle."""
 
-import time
 
 import numpy as np
 import pytest
@@ -103,7 +102,7 @@ def test_a_weight_beyond_float32_ends_with_the_last_good_state_and_advice():
 
 
 def test_a_time_limit_ends_a_solve_by_name():
-    began = time.perf_counter()
     limited = GridSettings(cells=8, coarsest=4, settled=0.0, time_limit_s=0.0)
-    assert solve_grid(problem(), limited).outcome is Outcome.time_limit
-    assert time.perf_counter() - began < 30
+    found = solve_grid(problem(), limited)
+    assert found.outcome is Outcome.time_limit
+    assert len(found.history) <= 2
