@@ -1,7 +1,7 @@
 """`airlens bench predict`: what a plan says of a room before, beside what solving it then takes and finds.
 
 The rooms are ones that neither the cost model nor the table of errors was made from. One row a room, level
-of information and preset: the shift's noise, solver seconds, memory and T error, predicted over found.
+of information and preset: the shift's noise, solver seconds and T error, predicted over found.
 """
 
 import json
@@ -59,12 +59,11 @@ def compared(
     machine, _ = this_machine()
     lines = preset_lines(problem, flow, machine.speeds, [windows_of(s) for s in signals])
     for line in (line for line in lines if line.preset in presets and line.fits):
-        found, memory_mb = alone(solved, path, options, information, line.preset)
+        found, _ = alone(solved, path, options, information, line.preset)
         yield {
             "room": path.stem, "information": information, "light": options.light, "preset": line.preset,
             "noise_px": _pair(signals[0].noise.mean_px, found["noise_px"]),
             "solver_s": _pair(line.solver_s, found["solver_s"]),
-            "memory_mb": _pair(line.memory_mb, memory_mb),
             "T_K": _pair(line.temperature_error_k, found["T_K"]),
             "u": _pair(line.velocity_error, found["u"]),
         }  # fmt: skip
@@ -95,7 +94,7 @@ def _pair(predicted: float | None, found: float | None) -> dict[str, float | Non
 def sentence(row: dict[str, Any]) -> str:
     """A row as a person reads it: predicted / found."""
     words = [f"{row['room']} {row['information']} {row['preset']}:"]
-    for name in ("noise_px", "solver_s", "memory_mb", "T_K", "u"):
+    for name in ("noise_px", "solver_s", "T_K", "u"):
         pair = row[name]
         if pair["ratio"] is not None:
             words.append(f"{name} {pair['predicted']:g} / {pair['found']:g} ({pair['ratio']:.2f}x)")

@@ -1,6 +1,5 @@
 """The grid's descent: resumed, stopped and broken in the middle."""
 
-
 import numpy as np
 import pytest
 
