@@ -12,11 +12,14 @@ from scipy.ndimage import uniform_filter
 from core.camera_noise import frame_variance
 from core.displacement import measure_shift, standard_deviation_px
 from core.geometry import Optics, crop
+from core.problem import ShiftMeasurement
 from core.render import render_reference
 from core.scene import Scene
 
 # Fewer windows than this in a crop leave the filter's edge in most of them.
 _WINDOWS_A_CROP = 6
+# Information matrices nearer to singular than this know nothing of one direction: no pattern there.
+_SINGULAR = 1e-6
 
 
 @dataclass(frozen=True)
@@ -44,15 +47,20 @@ def shift_noise(scene: Scene, view: int, window_px: int) -> ShiftNoise:
     eye = scene.views[view]
     deviations, levels, contrasts, slopes = [], [], [], []
     for centre in ((0.5, 0.5), (0.2, 0.2), (0.8, 0.2), (0.2, 0.8), (0.8, 0.8)):
-        part = replace(eye, camera=_crop(eye.camera, centre, _WINDOWS_A_CROP * window_px))
-        views = tuple(part if i == view else v for i, v in enumerate(scene.views))
+        cropped = replace(eye, camera=_crop(eye.camera, centre, _WINDOWS_A_CROP * window_px))
+        views = tuple(cropped if i == view else v for i, v in enumerate(scene.views))
         image = np.clip(render_reference(replace(scene, views=views), view), 0.0, 1.0)
         if image.std() == 0.0 or min(image.shape) < window_px:
             continue
         # Both exposures carry the noise of their mean.
         variance = uniform_filter(frame_variance(image, eye.noise), 2 * window_px) * 2 / eye.frames
         measured = measure_shift(image, image, variance, window_px)
-        deviations.append(standard_deviation_px(measured))
+        matrix = measured.information_per_px2
+        textured = np.linalg.det(matrix) > _SINGULAR * np.trace(matrix, axis1=1, axis2=2) ** 2
+        if not textured.any():
+            continue
+        part = [values[textured] for values in (measured.centres_px, measured.displacement_px, matrix)]
+        deviations.append(standard_deviation_px(ShiftMeasurement(*part, window_px)))
         levels.append(image.mean())
         contrasts.append(image.std() / image.mean())
         slopes.append(np.std(np.gradient(image, axis=1)))

@@ -81,9 +81,9 @@ def shift_map(scene: Scene, view: int, flow: ExpectedFlow, window_px: int) -> Sh
     """Expected displacements over the back wall, thinned to at most some 3000 windows."""
     camera = scene.views[view].camera
     shape = (camera.height_px, camera.width_px)
-    total = (shape[0] // window_px) * (shape[1] // window_px)
-    stride = max(1, int(np.ceil(np.sqrt(total / _MOST_WINDOWS))))
-    centres = window_centres(shape, window_px).reshape(shape[0] // window_px, -1, 2)
+    rows, columns = (side // window_px for side in shape)
+    stride = max(1, int(np.ceil(np.sqrt(rows * columns / _MOST_WINDOWS))))
+    centres = window_centres(shape, window_px).reshape(rows, columns, 2)
     centres = centres[stride // 2 :: stride, stride // 2 :: stride].reshape(-1, 2)
     centres = centres[sees_wall(scene, view, centres, margin_px=float(window_px))]
     if not len(centres):
