@@ -60,8 +60,8 @@ _NOT_AIR = (
 )
 # Lit by a projector the shift is what is left of two larger ones, each with its representation error.
 _TWO_PATHS = 3.3
-# Draws are solved to this share: their scatter is known to a fifth.
-_ROUGH = 1e-2
+# Draws are solved more tightly: the broad modes, which are the uncertain ones, come last.
+_DRAWN = 3e-4
 
 
 def solve_temperature(
@@ -77,10 +77,10 @@ def solve_temperature(
     system, prior = _system(problem, operators, grid, settings)
     inverse = preconditioner(system)
     n, iterations, settled = _minimise(system, inverse, problem.shifts, prior, air, settings, on_event)
-    doubted = system.with_fewer_data(settings.together)
+    doubted = system.with_fewer_data(settings.together * _paths(problem) ** 2)
     rough = preconditioner(doubted)
     std = deviation(
-        doubted, lambda rhs: _solved(doubted, rough, rhs, _ROUGH, settings)[0], settings.draws, seed=0
+        doubted, lambda rhs: _solved(doubted, rough, rhs, _DRAWN, settings)[0], settings.draws, seed=0
     )
     index = n + air.ambient_refractivity
     thinnest = air.ambient_refractivity * air.ambient_temperature_k / _HOTTEST_K
@@ -120,8 +120,8 @@ def _system(
     per_k = air.ambient_refractivity / air.ambient_temperature_k
     prior_k = prior_temperature(problem, grid)
     prior = excess(air, prior_k + level_k(known, prior_k) - air.ambient_temperature_k)
-    paths = _TWO_PATHS if isinstance(problem.scene.light, ProjectedPattern) else 1.0
-    weights = tuple(data_weight(s, paths * settings.representation) for s in problem.shifts)
+    representation = _paths(problem) * settings.representation
+    weights = tuple(data_weight(s, representation) for s in problem.shifts)
     size = prior_size(operators, weights, problem.shifts, prior, grid, settings)
     # A room's worth of independent values: one a hundred vertices.
     mass = 0.01 / size**2
@@ -138,6 +138,10 @@ def _system(
         slopes=steepest_slopes(problem.scene),
         profile=None if problem.planes else profile_weight(per_k * profile_range_k(problem), grid),
     ), prior
+
+
+def _paths(problem: Problem) -> float:
+    return _TWO_PATHS if isinstance(problem.scene.light, ProjectedPattern) else 1.0
 
 
 def _minimise(
