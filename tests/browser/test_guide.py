@@ -27,7 +27,7 @@ def test_a_calibration_is_guided_from_the_first_view_to_the_response(station: St
     snapshot(page, "guide-camera")
     known = page.locator("section[aria-labelledby=known-title]")
     expect(known).to_contain_text("Still to calibrate: wall.")
-    expect(known.get_by_role("row", name="back wall")).to_contain_text("not calibrated")
+    expect(known.get_by_role("row", name="back wall")).to_contain_text("missing")
     page.get_by_role("row", name="view_03.png").get_by_role("button", name="Retake").click()
     expect(views).to_have_count(11)
     page.get_by_role("button", name="Take", exact=True).click()
