@@ -33,7 +33,7 @@ def connected(station: Station, opens: Opens) -> Page:
 
 
 def go_to(page: Page, name: str) -> None:
-    page.get_by_role("button", name=name, exact=True).click()
+    page.get_by_role("button", name=name, exact=True).first.click()
     expect(page.locator("main")).to_have_attribute("aria-label", name)
 
 
