@@ -34,6 +34,8 @@ from app.errors import AirlensError
 from app.jobs import JobSpec, JobState, Ledger
 from app.jobs.folder import JobFolder, Owner
 
+# After the last kill, so that what is counted as lost really is.
+GRACE_S = 900.0
 ROLES = ("supervisor", "worker", "web")
 CONFIG = """
 devices = ["cpu:0", "cpu:1"]
@@ -139,17 +141,18 @@ def disturb(
     waiting, start_s = list(enumerate(wanted)), time.monotonic()
     ids: dict[int, str] = {}
     try:
-        while time.monotonic() - start_s < limit_s:
+        while time.monotonic() - start_s < limit_s + GRACE_S:
             owner, killed = kept.pid(), sum(counts[name] for name in ROLES)
+            killing = killed < kills and time.monotonic() - start_s < limit_s
             for n, spec in waiting[:2]:
-                if (n - 1) * kills > killed * len(wanted):  # one waits while one runs
+                if killing and (n - 1) * kills > killed * len(wanted):  # one waits while one runs
                     break
                 with contextlib.suppress(AirlensError, httpx.HTTPError, OSError):
                     ids[n] = submit(f"chaos-job-{n}", spec)
                     waiting.remove((n, spec))
             _observe(counts, living(ledger.folder))
             ended = sum(job.state is JobState.done for job in ledger.jobs())
-            if killed < kills:
+            if killing:
                 counts["ended_during_kills"] = ended
                 time.sleep(chance.expovariate(1 / pause_s))
                 alive = living(ledger.folder)  # looked up again: only what lives can be killed
@@ -275,7 +278,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=20)
     parser.add_argument("--trials", type=int, default=2000)
     parser.add_argument("--pause-s", type=float, default=4.0, help="mean pause between kills")
-    parser.add_argument("--limit-s", type=float, default=1800.0)
+    parser.add_argument("--limit-s", type=float, default=1800.0, help="no kills after that")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--web", action="store_true", help="submit to airlens serve, and kill that too")
     options = vars(parser.parse_args())
