@@ -59,8 +59,9 @@ def shift_noise(scene: Scene, view: int, window_px: int) -> ShiftNoise:
         textured = np.linalg.det(matrix) > _SINGULAR * np.trace(matrix, axis1=1, axis2=2) ** 2
         if not textured.any():
             continue
-        part = [values[textured] for values in (measured.centres_px, measured.displacement_px, matrix)]
-        deviations.append(standard_deviation_px(ShiftMeasurement(*part, window_px)))
+        centres_px, displacement_px = measured.centres_px[textured], measured.displacement_px[textured]
+        part = ShiftMeasurement(centres_px, displacement_px, matrix[textured], window_px)
+        deviations.append(standard_deviation_px(part))
         levels.append(image.mean())
         contrasts.append(image.std() / image.mean())
         slopes.append(np.std(np.gradient(image, axis=1)))
