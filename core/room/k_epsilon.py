@@ -58,7 +58,7 @@ def advance(
     k, epsilon = state.energy_m2_s2, state.dissipation_m2_s3
     eddy = scale * state.eddy_m2_s()
     production = eddy * strain_squared(velocity, grid)
-    touched, wall_production, wall_epsilon = wall_sources(k, velocity, grid, molecular_m2_s)
+    touched, wall_production, wall_epsilon = wall_sources(k, velocity, boundary, grid, molecular_m2_s)
     production = jnp.where(touched > 0, wall_production, production)
     inflow_k = tuple(
         (low.turbulent_energy_m2_s2, high.turbulent_energy_m2_s2) for low, high in boundary.walls
@@ -85,25 +85,29 @@ def strain_squared(velocity: Velocity, grid: RoomGrid) -> Cells:
 
 
 def wall_sources(
-    k: Cells, velocity: Velocity, grid: RoomGrid, molecular_m2_s: Float[Array, ""]
-) -> tuple[Float[np.ndarray, "nx ny nz"], Cells, Cells]:
-    """Number of walls that each cell touches, and there the production and epsilon."""
+    k: Cells, velocity: Velocity, boundary: Boundary, grid: RoomGrid, molecular_m2_s: Float[Array, ""]
+) -> tuple[Cells, Cells, Cells]:
+    """Number of walls that each cell touches, free surfaces apart, and there the production and epsilon."""
     cells = [face_mean(velocity[a], a) for a in AXES]
-    touched = walls_touched(grid)
+    touched = jnp.zeros_like(k)
     production, epsilon = jnp.zeros_like(k), jnp.zeros_like(k)
     walls = energy_walls(k, grid, molecular_m2_s)
     for a in AXES:
         y = 0.5 * grid.spacing_m[a]
-        parts = []
+        parts, grips = [], [jnp.full(grid.plane(a), wall.grip) for wall in boundary.walls[a]]
         for side, nearest in enumerate((first_plane, last_plane)):
             b, c = (other for other in AXES if other != a)
             speed = jnp.sqrt(nearest(cells[b], a) ** 2 + nearest(cells[c], a) ** 2 + 1e-12)
             root = jnp.sqrt(nearest(k, a))
             rate = C_MU**0.25 * root / (KAPPA * y)
-            parts.append((walls[a][side] * speed / y * rate, C_MU**0.75 * root**3 / (KAPPA * y)))
+            grip = grips[side]
+            parts.append(
+                (grip * walls[a][side] * speed / y * rate, grip * C_MU**0.75 * root**3 / (KAPPA * y))
+            )
         production = add_to_walls(production, parts[0][0], parts[1][0], a)
         epsilon = add_to_walls(epsilon, parts[0][1], parts[1][1], a)
-    weight = 1.0 / np.maximum(touched, 1.0)
+        touched = add_to_walls(touched, grips[0], grips[1], a)
+    weight = 1.0 / jnp.maximum(touched, 1.0)
     return touched, production * weight, epsilon * weight
 
 
@@ -128,29 +132,22 @@ def heat_walls(
 ) -> tuple[tuple[Float[Array, "..."], Float[Array, "..."]], ...]:
     """Heat coefficient of the walls' air relative to free convection's nominal one (low, high an axis).
 
-    Jayatilleke's wall function where the air is stirred, half of the nominal coefficient where it is not:
-    a jet that sweeps a wall takes several times the heat of a still corner.
+    Jayatilleke's wall function where the air is stirred; where it is not, half of the nominal coefficient or
+    conduction through half a cell. A jet that sweeps a wall takes several times the heat of a still corner.
     """
     roughness = 9.24 * ((0.71 / 0.85) ** 0.75 - 1.0) * (1.0 + 0.28 * np.exp(-0.007 * 0.71 / 0.85))
     walls = []
     for a in AXES:
+        y = 0.5 * grid.spacing_m[a]
         sides = []
         for nearest in (first_plane, last_plane):
             friction = C_MU**0.25 * jnp.sqrt(nearest(k, a))
-            y_plus = friction * 0.5 * grid.spacing_m[a] / molecular_m2_s
+            y_plus = friction * y / molecular_m2_s
             profile = jnp.log(jnp.maximum(WALL_E * y_plus, 40.0)) / KAPPA + roughness
-            sides.append(jnp.maximum(friction / (0.85 * profile) / NOMINAL_HEAT_M_S, 0.5))
+            heat = jnp.maximum(friction / (0.85 * profile), molecular_m2_s / (0.71 * y))
+            sides.append(jnp.maximum(heat / NOMINAL_HEAT_M_S, 0.5))
         walls.append((sides[0], sides[1]))
     return tuple(walls)
-
-
-def walls_touched(grid: RoomGrid) -> Float[np.ndarray, "nx ny nz"]:
-    """How many walls each cell lies against."""
-    touched = np.zeros(grid.cells, np.float32)
-    for a in AXES:
-        for plane in (0, -1):
-            touched[tuple(plane if b == a else slice(None) for b in AXES)] += 1.0
-    return touched
 
 
 def _central(cells: Cells, axis: int, grid: RoomGrid) -> Cells:

@@ -1,0 +1,228 @@
+"""Rooms that no fit was tuned on, made by the room solver at other settings than the reconstruction's.
+
+Another turbulence model or another closure constant, other walls' heat, a finer grid, other sizes and numbers
+of vertices. Each is written in the format of a room volume (NPZ), so that `airlens simulate --truth`,
+`reconstruct` and `score` take it as any other. One JSON line a room: how the march ended, and its cost.
+
+    python -m tests.benchmarks.other_rooms FOLDER [--only jet]
+"""
+
+import argparse
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from app.room_scene import RigOptions, room_scene
+from app.truth import RoomVolume
+from core.problem import Problem
+from core.room.grid import AXES
+from core.room.march import MarchSettings, march
+from core.room.model import RoomModel
+from core.room.prior import room_prior
+from core.room.room import Room, carried_over, room, seen
+from core.room.vertices import cell_matrix
+
+T0_K, NU, PRANDTL = 293.15, 1.5e-5, 0.71
+SIDES = ["xMaxWall", "front", "back"]
+INSULATED = ["floor", "ceiling", "xMinWall"]
+
+
+@dataclass(frozen=True)
+class Made:
+    """One room to make: its box, openings, walls, and the model that stands for the truth."""
+
+    domain: tuple[float, float, float, float, float, float]
+    vertices: tuple[int, int, int]
+    closure: str
+    cells: int
+    title: str
+    inlets: tuple[dict[str, Any], ...] = ()
+    outlet: dict[str, Any] | None = None
+    heater: dict[str, Any] | None = None
+    wall_t: tuple[tuple[str, float], ...] = ()
+    adiabatic: tuple[str, ...] = tuple(INSULATED)
+    heat_factor: float = 1.3
+    closure_factor: float = 1.0
+    settle_s: float = 300.0
+    refine_s: float = 80.0
+
+
+def _box(y: tuple[float, float], z: tuple[float, float]) -> dict[str, Any]:
+    return {"y": list(y), "z": list(z)}
+
+
+ROOMS = {
+    "jet": Made(
+        domain=(0.0, 4.8, -1.8, 1.8, 0.0, 2.7),
+        vertices=(66, 50, 42),
+        closure="zero_equation",
+        cells=64,
+        title="cool jet below the ceiling, zero-equation truth",
+        inlets=({**_box((-0.35, 0.35), (2.25, 2.45)), "U": 0.6, "dT": -5.0},),
+        outlet=_box((0.6, 1.2), (0.2, 0.6)),
+        wall_t=(("back", T0_K + 1.0),),
+    ),
+    "plume": Made(
+        domain=(-1.5, 1.9, -1.4, 1.4, 0.0, 3.2),
+        vertices=(56, 46, 60),
+        closure="k_epsilon",
+        cells=56,
+        title="plume over a heated floor patch, displacement supply",
+        inlets=({**_box((-0.6, 0.6), (0.05, 0.45)), "U": 0.12, "dT": -1.0},),
+        outlet=_box((-0.3, 0.3), (2.7, 3.0)),
+        heater={"x": [0.2, 0.8], "y": [-0.3, 0.3], "dT": 25.0},
+        closure_factor=1.3,
+    ),
+    "two_inlets": Made(
+        domain=(-1.2, 2.6, -1.6, 1.6, 0.0, 2.8),
+        vertices=(60, 52, 46),
+        closure="zero_equation",
+        cells=60,
+        title="a warm and a cool jet side by side",
+        inlets=(
+            {**_box((-0.9, -0.4), (1.7, 1.95)), "U": 0.4, "dT": 6.0},
+            {**_box((0.5, 0.9), (1.1, 1.35)), "U": 0.5, "dT": -2.0},
+        ),
+        outlet=_box((-0.3, 0.3), (0.15, 0.5)),
+    ),
+    "constant": Made(
+        domain=(-1.0, 2.6, -1.3, 1.7, 0.0, 2.9),
+        vertices=(58, 48, 48),
+        closure="constant",
+        cells=56,
+        title="warm jet off the middle, constant eddy viscosity",
+        inlets=({**_box((-0.1, 0.5), (1.3, 1.55)), "U": 0.45, "dT": 7.0},),
+        outlet=_box((-0.9, -0.3), (2.2, 2.6)),
+    ),
+}
+
+
+def made(name: str) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """The room's arrays and a row about how it was made."""
+    what = ROOMS[name]
+    began_s = time.process_time()
+    volume = _empty(name, what)
+    scene = room_scene(volume, RigOptions(), "surveyed")
+    coarse, fine = (room(scene, n, what.closure) for n in (32, what.cells))
+    parameters = room_prior(Problem(scene, (), ()), coarse.layout).mean
+    parameters = eqx.tree_at(
+        lambda p: (p.log_heat, p.log_closure),
+        parameters,
+        (jnp.float32(np.log(what.heat_factor)), jnp.float32(np.log(what.closure_factor))),
+    )
+    model = coarse.model(parameters)
+    excess = 0.5 * float(np.mean([i["dT"] for i in what.inlets] or [1.0]))
+    flow = coarse.at_rest(model, np.full(coarse.grid.cells[2], excess))
+    first = march(flow, model, MarchSettings(longest_s=what.settle_s, tolerance=0.004))
+    model = fine.model(parameters)
+    flow = carried_over(first.last, coarse.grid, fine.grid)
+    last = march(flow, model, MarchSettings(longest_s=what.refine_s, tolerance=0.004))
+    row = {
+        "room": name,
+        "closure": what.closure,
+        "cells": list(fine.grid.cells),
+        "coarse_change": first.change,
+        "change": last.change,
+        "outcome": last.outcome.name,
+        "cpu_s": time.process_time() - began_s,
+    }
+    return _arrays(what, volume, fine, model, last.mean), row
+
+
+def _empty(name: str, what: Made) -> RoomVolume:
+    """Still air on the room's vertices, with the case described."""
+    x0, x1, y0, y1, z0, z1 = what.domain
+    axes = [np.linspace(a, b, n) for a, b, n in zip((x0, y0, z0), (x1, y1, z1), what.vertices, strict=True)]
+    case = {
+        "name": name,
+        "title": what.title,
+        "T0": T0_K,
+        "beta": 1.0 / T0_K,
+        "nu": NU,
+        "Pr": PRANDTL,
+        "Prt": 0.85,
+        "g": 9.81,
+        "domain": list(what.domain),
+        "outlet": what.outlet,
+        "adiabatic_walls": list(what.adiabatic),
+        "TI": 0.1,
+        "lscale": 0.05,
+        "heater": what.heater,
+        "inlets": list(what.inlets),
+    }
+    # One of the format's two ways to state walls: all at T0, or each by name.
+    warm = dict(what.wall_t)
+    case |= {"wall_T": dict.fromkeys(SIDES, T0_K) | warm} if warm else {"isothermal_walls": SIDES}
+    zero = np.zeros(what.vertices, np.float32)
+    return RoomVolume(
+        *axes,
+        temperature_k=zero + np.float32(T0_K),
+        pressure_m2_s2=zero,
+        velocity_m_s=np.zeros((*what.vertices, 3), np.float32),
+        ambient_k=T0_K,
+        case=case,
+        scalars={"nu": NU, "Pr": PRANDTL},
+    )
+
+
+def _arrays(what: Made, volume: RoomVolume, fine: Room, model: RoomModel, flow: Any) -> dict[str, np.ndarray]:
+    """The volume's arrays, named as in the format."""
+    field = seen(flow, model, what.vertices)
+    nut = np.asarray(model.viscosity(flow).cells_m2_s) - NU
+    for a in AXES:
+        edge = [(1, 1) if b == a else (0, 0) for b in AXES]
+        nut = np.moveaxis(
+            np.tensordot(cell_matrix(fine.grid, a, what.vertices[a]), np.pad(nut, edge, mode="edge"), (1, a)),
+            0,
+            a,
+        )
+    t, p, u = T0_K + field.excess_k, field.pressure_m2_s2, field.velocity_m_s
+    inlets = what.inlets
+    arrays = {"x": volume.x_m, "y": volume.y_m, "z": volume.z_m, "T": t, "p": p, "u": u, "nut": nut}
+    arrays |= {f"bc_{k}": arrays[k][0] for k in ("T", "p", "u", "nut")}
+    arrays = {k: np.asarray(v, np.float32) for k, v in arrays.items()}
+    arrays |= {
+        "bc_mask": _mask(what, volume),
+        "bc_x": np.float32(what.domain[0]),
+        "e_g": np.array([0.0, 0.0, -1.0]),
+        "T_in": np.array([T0_K + i["dT"] for i in inlets]),
+        "U_in": np.array([i["U"] for i in inlets]),
+        "inlet_box_yz": np.array([[*i["y"], *i["z"]] for i in inlets]).reshape(-1, 4),
+    }
+    numbers = {"T0": T0_K, "rho0": 1.2041, "G": 2.26e-4, "beta": 1.0 / T0_K, "nu": NU, "Pr": PRANDTL}
+    arrays |= {k: np.float64(v) for k, v in (numbers | {"Prt": 0.85, "g": 9.81}).items()}
+    arrays["meta_json"] = np.array(json.dumps({"case": volume.case, "solver": f"airlens {what.closure}"}))
+    return arrays
+
+
+def _mask(what: Made, volume: RoomVolume) -> np.ndarray:
+    """1, 2 inlets, -1 outlet, 0 wall on x_min."""
+    mask = np.zeros((len(volume.y_m), len(volume.z_m)), np.int8)
+    patches = [(n + 1, i) for n, i in enumerate(what.inlets)]
+    axes = {"y": volume.y_m, "z": volume.z_m}
+    for value, box in [*patches, *([(-1, what.outlet)] if what.outlet else [])]:
+        inside = [(axis >= box[a][0]) & (axis <= box[a][1]) for a, axis in axes.items()]
+        mask[np.ix_(*inside)] = value
+    return mask
+
+
+def main() -> None:
+    """Make the rooms and say what each cost."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", choices=sorted(ROOMS), action="append")
+    options = parser.parse_args()
+    for name in options.only or ROOMS:
+        arrays, row = made(name)
+        np.savez_compressed(options.folder / f"{name}.npz", **arrays)
+        print(json.dumps(row), flush=True)
+
+
+if __name__ == "__main__":
+    main()
