@@ -35,6 +35,7 @@ class RoomSettings:
 
     The coarse room is corrected while a parameter moves by more than `coarse_step` prior deviations and
     the misfit falls below `worthwhile` of what it was: a coarse grid's own error must not move the rest.
+    A Jacobian serves for `straight` prior deviations.
     """
 
     cells: int = 48
@@ -44,6 +45,7 @@ class RoomSettings:
     coarse_rounds: int = 4
     coarse_step: float = 1.0
     worthwhile: float = 0.85
+    straight: float = 4.0
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 45.0

@@ -8,6 +8,7 @@ the closure cannot represent, from the differences of two grids and of two closu
 
 import time
 
+import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 
@@ -38,6 +39,17 @@ Vector = Float[np.ndarray, " active"]
 _HARM = 1.5
 
 
+class Begun(eqx.Module):
+    """A room before any image: its two grids, what may be wrong, and the coarse one settled and linearised."""
+
+    problem: Problem
+    coarse: Room
+    fine: Room
+    prior: Prior
+    base: Attempt
+    jacobian: list[Prediction]
+
+
 def solve_room(
     problem: Problem, settings: RoomSettings = RoomSettings(), *, on_event: Event | None = None
 ) -> Solution:
@@ -48,14 +60,32 @@ def solve_room(
     """
     start_s = time.perf_counter()
     tell: Event = on_event or (lambda _: None)
+    return finish(begin(problem, settings, tell), problem, settings, tell, start_s=start_s)
+
+
+def begin(problem: Problem, settings: RoomSettings, tell: Event) -> Begun:
+    """What is the same for all images of a room: the coarse room as stated, and its derivatives."""
     problem = with_plane_openings(problem)
     closure = closure_name(problem.scene)
     coarse, fine = (room(problem.scene, n, closure) for n in (settings.coarse_cells, settings.cells))
     vertices = (settings.vertices, settings.vertices, settings.vertices)
-    data = observations(problem, vertices)
     prior = room_prior(problem, coarse.layout, log_viscosity_std=settings.log_viscosity_std)
     base = settled(coarse, prior, problem, settings, vertices, tell)
-    vector, base, jacobian = coarse_fit(coarse, prior, data, base, settings, tell)
+    vector = np.zeros(len(prior.active()))
+    jacobian = perturbed(coarse, prior, vector, base, settings, vertices)
+    return Begun(problem, coarse, fine, prior, base, jacobian)
+
+
+def finish(
+    begun: Begun, problem: Problem, settings: RoomSettings, tell: Event, *, start_s: float
+) -> Solution:
+    """The solution for the shifts of `problem`, another measurement of the room that was begun."""
+    coarse, fine, prior = begun.coarse, begun.fine, begun.prior
+    stated = begun.problem
+    problem = Problem(stated.scene, problem.shifts, stated.planes, stated.sensors)
+    vertices = (settings.vertices, settings.vertices, settings.vertices)
+    data = observations(problem, vertices)
+    vector, base, jacobian = coarse_fit(begun, data, settings, tell)
     other = otherwise_closed(coarse, prior.parameters(vector), base, settings, vertices)
     flow = carried_over(base.flow.last, coarse.grid, fine.grid)
     first = attempt(fine, prior.parameters(vector), flow, settings.refine_s, vertices, tell)
@@ -65,12 +95,14 @@ def solve_room(
 
 
 def coarse_fit(
-    coarse: Room, prior: Prior, data: Observations, base: Attempt, settings: RoomSettings, tell: Event
+    begun: Begun, data: Observations, settings: RoomSettings, tell: Event
 ) -> tuple[Vector, Attempt, list[Prediction]]:
-    """Parameters that the coarse room asks for, the room under them, and the runs of its Jacobian."""
-    vector = np.zeros(len(prior.active()))
-    jacobian = perturbed(coarse, prior, vector, base, settings, data.vertices)
-    moved = False
+    """Parameters that the coarse room asks for, the room under them, and the runs of its Jacobian.
+
+    Far from where it was made a Jacobian misleads: it is made anew after every `settings.straight` prior deviations.
+    """
+    coarse, prior, base, jacobian = begun.coarse, begun.prior, begun.base, begun.jacobian
+    vector = linearised = np.zeros(len(prior.active()))
     for n in range(settings.coarse_rounds if settings.use_images else 0):
         # No second grid yet: half of the misfit is taken for the grid's.
         half = 0.5 * (data.values()[0] - data.predicted(base.seen))
@@ -83,8 +115,10 @@ def coarse_fit(
         tell({"coarse_round": n + 1.0, "misfit_left": left, **fitted(prior, new)})
         if left > settings.worthwhile:
             break
-        vector, base, moved = new, tried, True
-    if moved:
+        vector, base = new, tried
+        if float(np.abs(vector - linearised).max()) > settings.straight:
+            jacobian, linearised = perturbed(coarse, prior, vector, base, settings, data.vertices), vector
+    if np.any(vector != linearised):
         jacobian = perturbed(coarse, prior, vector, base, settings, data.vertices)
     return vector, base, jacobian
 

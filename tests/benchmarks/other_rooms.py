@@ -76,7 +76,7 @@ ROOMS = {
         title="plume over a heated floor patch, displacement supply",
         inlets=({**_box((-0.6, 0.6), (0.05, 0.45)), "U": 0.12, "dT": -1.0},),
         outlet=_box((-0.3, 0.3), (2.7, 3.0)),
-        heater={"x": [0.2, 0.8], "y": [-0.3, 0.3], "dT": 25.0},
+        heater={"x": [0.2, 0.8], "y": [-0.3, 0.3], "dT": 60.0},
         closure_factor=1.3,
     ),
     "two_inlets": Made(
@@ -103,7 +103,7 @@ ROOMS = {
 }
 
 
-def made(name: str) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def made(name: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """The room's arrays and a row about how it was made."""
     what = ROOMS[name]
     began_s = time.process_time()
@@ -171,7 +171,7 @@ def _empty(name: str, what: Made) -> RoomVolume:
     )
 
 
-def _arrays(what: Made, volume: RoomVolume, fine: Room, model: RoomModel, flow: Any) -> dict[str, np.ndarray]:
+def _arrays(what: Made, volume: RoomVolume, fine: Room, model: RoomModel, flow: Any) -> dict[str, Any]:
     """The volume's arrays, named as in the format."""
     field = seen(flow, model, what.vertices)
     nut = np.asarray(model.viscosity(flow).cells_m2_s) - NU
