@@ -25,7 +25,7 @@ class Solve(Protocol):
 
 
 STANDARD = RoomSettings()
-REFERENCE = RoomSettings(cells=64, coarse_cells=40, restart_s=80.0, final_s=90.0)
+REFERENCE = RoomSettings(cells=64, coarse_cells=40, restart_s=80.0)
 
 
 def solve_standard(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:

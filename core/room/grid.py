@@ -49,12 +49,28 @@ class RoomGrid(eqx.Module):
         return self.lower_m[axis] + self.spacing_m[axis] * (np.arange(self.cells[axis]) + 0.5)
 
 
-def room_grid(room: Box, cells: int) -> RoomGrid:
-    """Nearly cubic cells, about cells^3 of them, and at least 4 along every axis."""
+def room_grid(room: Box, cells: int, edges_m: tuple[tuple[float, ...], ...] = ((), (), ())) -> RoomGrid:
+    """Nearly cubic cells, about cells^3 of them, and at least 4 along every axis.
+
+    An axis may have up to a tenth more cells where more of `edges_m` (of openings, an axis) then lie on faces.
+    """
     edge = float(np.prod(room.size_m)) ** (1 / 3) / cells
-    nx, ny, nz = (max(4, round(size / edge)) for size in room.size_m)
+    nx, ny, nz = (
+        _aligned(max(4, round(size / edge)), [(e - low) / size for e in edges])
+        for size, low, edges in zip(room.size_m, room.lower_m, edges_m, strict=True)
+    )
     lx, ly, lz = room.size_m
     return RoomGrid(cells=(nx, ny, nz), lower_m=room.lower_m, spacing_m=(lx / nx, ly / ny, lz / nz))
+
+
+def _aligned(least: int, shares: list[float]) -> int:
+    """The number of cells that leaves edges, at these shares of the axis, least far from faces in all."""
+
+    def apart(cells: int) -> float:
+        return sum(abs(cells * share - round(cells * share)) for share in shares)
+
+    # Within a tenth of a cell an edge is as good as on the face.
+    return min(range(least, least + least // 10 + 1), key=lambda cells: (round(apart(cells), 1), cells))
 
 
 def cut(field: Float[Array, "..."], start: int, stop: int, axis: int) -> Float[Array, "..."]:

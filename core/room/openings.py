@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from core.geometry import Box
 from core.room.grid import AXES, WALLS, RoomGrid
-from core.scene import Inlet, Patch, Scene, Wall
+from core.scene import Inlet, Outlet, Patch, Scene, Wall
 from core.setting import SettingError
 
 C_MU = 0.09
@@ -58,6 +58,17 @@ def lay_patch(patch: Patch, room: Box, grid: RoomGrid, notes: list[str]) -> Open
     )
     area = (patch.upper_m[0] - patch.lower_m[0]) * (patch.upper_m[1] - patch.lower_m[1])
     return Opening(wall, covered, area)
+
+
+def opening_edges_m(scene: Scene) -> tuple[tuple[float, ...], ...]:
+    """Where inlets and outlets begin and end along each axis [m]: a face there keeps a jet's first profile."""
+    edges: tuple[list[float], ...] = ([], [], [])
+    for part in scene.boundary:
+        if isinstance(part, Inlet | Outlet):
+            along = [a for a in AXES if a != WALLS.index(part.patch.wall) // 2]
+            for a, low, high in zip(along, part.patch.lower_m, part.patch.upper_m, strict=True):
+                edges[a].extend((low, high))
+    return tuple(tuple(e) for e in edges)
 
 
 def refuse_overlaps(patches: list[Patch]) -> None:

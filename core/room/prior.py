@@ -34,29 +34,42 @@ _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
 
 
 class Prior(eqx.Module):
-    """Mean and standard deviation of every parameter; a parameter of zero deviation is not fitted."""
+    """Mean and standard deviation of every parameter; a parameter of zero deviation is not fitted.
+
+    Where walls' heat follows from the balance of the stated supply and a thermometer in what leaves
+    (`leaving_excess_k`), another supply moves it along: the thermometer stays.
+    """
 
     mean: RoomParameters
     std: RoomParameters
+    supply_m3_s: Float[np.ndarray, " inlets"]
+    leaving_excess_k: float | None = eqx.field(static=True)
 
     def active(self) -> np.ndarray:
         """Indices of the fitted parameters in the flattened vector."""
         return np.flatnonzero(np.asarray(ravel_pytree(self.std)[0]) > 0)
 
-    def vector(self, parameters: RoomParameters) -> Float[np.ndarray, " active"]:
-        """Fitted parameters in units of their deviations from the mean."""
-        flat, mean, std = (np.asarray(ravel_pytree(p)[0], float) for p in (parameters, self.mean, self.std))
-        chosen = self.active()
-        return (flat[chosen] - mean[chosen]) / std[chosen]
-
     def parameters(self, vector: Float[np.ndarray, " active"]) -> RoomParameters:
-        """The inverse of `vector`."""
+        """Parameters from fitted ones in units of their deviations from the mean."""
         mean, restore = ravel_pytree(self.mean)
         std = np.asarray(ravel_pytree(self.std)[0], float)
         chosen = self.active()
         flat = np.asarray(mean, float).copy()
         flat[chosen] += vector * std[chosen]
-        return restore(jnp.asarray(flat, mean.dtype))
+        found = restore(jnp.asarray(flat, mean.dtype))
+        moved = found.wall_log_heat + self._balanced(found)
+        return eqx.tree_at(lambda p: p.wall_log_heat, found, moved)
+
+    def _balanced(self, found: RoomParameters) -> float:
+        """Logarithm of what the supply brings over what it was stated to bring, beyond what leaves."""
+        if self.leaving_excess_k is None:
+            return 0.0
+        flow = self.supply_m3_s * np.exp(np.asarray(found.inlet_log_flow, float))
+        brought = float(np.dot(flow, np.asarray(found.inlet_excess_k, float) - self.leaving_excess_k))
+        stated = float(
+            np.dot(self.supply_m3_s, np.asarray(self.mean.inlet_excess_k, float) - self.leaving_excess_k)
+        )
+        return float(np.log(np.clip(brought / stated, 0.25, 4.0))) if brought * stated > 0 else 0.0
 
     def names(self) -> list[str]:
         """Names of the fitted parameters, such as 'inlet_excess_k[0]'."""
@@ -81,7 +94,8 @@ def room_prior(problem: Problem, layout: RoomLayout, *, log_viscosity_std: float
         [0.0 if w is None or w.temperature_k is None else w.temperature_k - ambient for w in walls]
     )
     free = (layout.heated > 0) & (layout.held == 0)
-    heat_m_s = _WALL_HEAT_M_S if free.any() else _heat_balance_m_s(problem, layout, excess, wall_excess)
+    balanced = None if free.any() else _heat_balance_m_s(problem, layout, excess, wall_excess)
+    heat_m_s = _WALL_HEAT_M_S if balanced is None else balanced
     own, apart_k = _free_walls_k(problem, layout, excess, wall_excess)
     wall_excess = np.where(free, own, wall_excess)
     mean = RoomParameters(
@@ -106,7 +120,8 @@ def room_prior(problem: Problem, layout: RoomLayout, *, log_viscosity_std: float
         jnp.float32(_CLOSURE_STD),
         jnp.full((3, 3, 4), log_viscosity_std),
     )
-    return Prior(mean, std)
+    leaving = None if balanced is None else outflow_excess_k(problem)
+    return Prior(mean, std, _supply_m3_s(layout), leaving)
 
 
 def outflow_excess_k(problem: Problem) -> float | None:
@@ -167,18 +182,19 @@ def _supply_m3_s(layout: RoomLayout) -> Float[np.ndarray, " inlets"]:
 
 def _heat_balance_m_s(
     problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
-) -> float:
-    """One heat coefficient for all walls that closes the balance, within a factor of four of the guess."""
+) -> float | None:
+    """One heat coefficient for all walls that closes the balance, within a factor of four of the guess; or None."""
     leaving = outflow_excess_k(problem)
     areas = _heated_areas_m2(layout)
     if leaving is None or not layout.inlets or layout.heaters or areas.sum() == 0:
-        return _WALL_HEAT_M_S
+        return None
     brought = float(np.dot(_supply_m3_s(layout), inlet_excess_k - leaving))
     inside = _room_excess_k(problem, leaving)
     lost = float((areas * (inside - wall_excess_k)).sum())
     # Heat that flows from cold to warm says that something else is missing, not how well walls conduct.
-    found = brought / lost if brought * lost > 0 else _WALL_HEAT_M_S
-    return float(np.clip(found, _WALL_HEAT_M_S / 4, _WALL_HEAT_M_S * 4))
+    if not brought * lost > 0:
+        return None
+    return float(np.clip(brought / lost, _WALL_HEAT_M_S / 4, _WALL_HEAT_M_S * 4))
 
 
 def _room_excess_k(problem: Problem, leaving: float) -> float:

@@ -15,6 +15,7 @@ from core.room.closure import (
 from core.room.grid import AXES, RoomGrid, Velocity, room_grid
 from core.room.model import Flow, RoomModel, air_at_rest, room_model
 from core.room.observe import Prediction
+from core.room.openings import opening_edges_m
 from core.room.setup import RoomLayout, RoomParameters, boundary, room_layout
 from core.room.vertices import (
     linear_matrix,
@@ -88,7 +89,7 @@ class Room(eqx.Module):
 
 def room(scene: Scene, cells: int, closure: str) -> Room:
     """Lay `scene` on about cells^3 cells. Raises SettingError for a boundary that cannot be."""
-    layout = room_layout(scene, room_grid(scene.room, cells))
+    layout = room_layout(scene, room_grid(scene.room, cells, opening_edges_m(scene)))
     speeds = [float(np.linalg.norm(v)) for v in layout.inlet_velocity_m_s]
     return Room(scene, layout, closure, max([*speeds, _plume_speed_m_s(scene)]))
 

@@ -48,8 +48,8 @@ class RoomSettings:
     straight: float = 4.0
     settle_s: float = 150.0
     restart_s: float = 60.0
-    refine_s: float = 45.0
-    final_s: float = 60.0
+    refine_s: float = 60.0
+    final_s: float = 150.0
     use_images: bool = True
     log_viscosity_std: float = 0.0
     threads: int = 2

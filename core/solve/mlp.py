@@ -10,12 +10,13 @@ import time
 from collections.abc import Callable
 from typing import Any, Literal
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optax
 
 from core.losses import BoundaryLoss, Loss, PhysicsLoss, total
-from core.mlp import MlpSettings, initial_mlp
+from core.mlp import Mlp, MlpSettings, initial_mlp
 from core.problem import Problem
 from core.representation import Unknowns
 from core.result import Outcome, Solution
@@ -25,6 +26,7 @@ from core.solve.check import check_problem
 from core.solve.checkpoint import CheckpointStore, configuration_hash
 from core.solve.frame import frame_of
 from core.solve.loop import LoopSettings, run
+from core.solve.mlp_start import network_like
 from core.solve.regime import DataModel, Regime, Weights, losses_of
 from core.solve.solution import solution_of
 from core.traced_loss import TracedLoss
@@ -57,6 +59,7 @@ class MlpSolveSettings:
     ray_cells: int = 32
     wall_points: int = 65
     result_vertices: int = 64
+    start_steps: int = 2000
 
 
 def solve_mlp(
@@ -67,8 +70,12 @@ def solve_mlp(
     store: CheckpointStore | None = None,
     should_stop: Callable[[], bool] | None = None,
     watch: Callable[[Solution], object] | None = None,
+    start: Solution | None = None,
 ) -> Solution:
-    """T, p, u on `result_vertices` vertices an axis. Raises SettingError before the first iteration."""
+    """T, p, u on `result_vertices` vertices an axis; `start` is a solution that the network first imitates.
+
+    Raises SettingError before the first iteration.
+    """
     check_problem(problem, settings.regime)
     began = time.perf_counter()
     frame = frame_of(problem)
@@ -90,9 +97,14 @@ def solve_mlp(
         if watch is not None:
             watch(solution_of(unknowns, frame, (r, r, r), Outcome.step_limit, elapsed_s, ()))
 
+    unknowns = initial_unknowns(problem, settings, frame.lower, frame.upper)
+    network = unknowns.representation
+    if start is not None and isinstance(network, Mlp):
+        alike = network_like(network, start, frame, steps=settings.start_steps, seed=settings.loop.seed)
+        unknowns = eqx.tree_at(lambda u: u.representation, unknowns, alike)
     found = run(
         _objective,
-        initial_unknowns(problem, settings, frame.lower, frame.upper),
+        unknowns,
         losses,
         _optimiser(settings),
         settings.loop,
