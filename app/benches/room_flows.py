@@ -57,15 +57,12 @@ def register(bench: typer.Typer) -> None:
     @bench.command("room-flows")
     def room_flows(
         case: Annotated[Literal["jet", "tall", "both"], typer.Option()] = "both",
-        closure: Annotated[
-            list[Closure] | None, typer.Option(help="Of the tall cavity; both by default.")
-        ] = None,
         fine: Annotated[float, typer.Option(help="Multiplies every grid's cells along an edge.")] = 1.0,
         as_json: Annotated[bool, typer.Option("--json")] = False,
     ) -> None:
         """A plane jet's spreading rate and a tall heated cavity's profiles against measurements."""
         rows = [jet_row(fine)] if case != "tall" else []
-        rows += [tall_row(name, fine) for name in closure or CLOSURES if case != "jet"]
+        rows += [tall_row(name, fine) for name in CLOSURES if case != "jet"]
         for row in rows:
             typer.echo(json.dumps(row) if as_json else _sentence(row))
 

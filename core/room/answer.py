@@ -77,7 +77,7 @@ def sentences(
 ) -> list[str]:
     """Everything worth telling the operator."""
     parameters = solved.best.parameters
-    inflow = float(np.sum(np.asarray(solved.layout.inflow_m3_s(parameters))))
+    inflow = np.asarray(solved.layout.inflow_m3_s(parameters), float)
     return [
         *solved.layout.notes,
         *undetermined(solved.problem),

@@ -15,7 +15,7 @@ CORRELATED = 4.0
 # Errors of grid and closure reach over whole jets: the posterior counts that many times fewer data again.
 _COHERENT = 3.0
 _STUDENT_NU = 3.0
-_LONGEST_STEP = 2.0
+_LONGEST_STEP = 3.0
 
 
 class Posterior(eqx.Module):

@@ -1,6 +1,7 @@
 """What a fit says to the operator: balances, entries that the images contradict, and what to distrust."""
 
 import numpy as np
+from jaxtyping import Float
 
 from core.problem import Problem
 from core.room.fit import Posterior
@@ -68,14 +69,17 @@ def misfit(data: Observations, share: float) -> list[str]:
 
 
 def balances(
-    parameters: RoomParameters, inflow_m3_s: float, outflow_excess_k: float, problem: Problem
+    parameters: RoomParameters,
+    inflows_m3_s: Float[np.ndarray, " inlets"],
+    outflow_excess_k: float,
+    problem: Problem,
 ) -> list[str]:
-    """Heat that comes with the supply and leaves through outlet and walls."""
+    """Heat that comes with the supplies and leaves through outlet and walls."""
+    inflow_m3_s = float(inflows_m3_s.sum())
     if inflow_m3_s <= 0:
         return []
-    flows = np.asarray(parameters.inlet_excess_k)
     capacity_w_m3_k = problem.scene.air.density_kg_m3 * 1006.0
-    brought = capacity_w_m3_k * inflow_m3_s * float(flows.mean())
+    brought = capacity_w_m3_k * float(np.dot(inflows_m3_s, np.asarray(parameters.inlet_excess_k)))
     carried = capacity_w_m3_k * inflow_m3_s * outflow_excess_k
     return [
         f"Supply air brings {brought:.0f} W above ambient; {carried:.0f} W leave by the outlets and "

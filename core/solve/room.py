@@ -40,13 +40,14 @@ _HARM = 1.5
 
 
 class Begun(eqx.Module):
-    """A room before any image: its two grids, what may be wrong, and the coarse one settled and linearised."""
+    """A room before any image, as stated: both grids settled, and the coarse one's derivatives."""
 
     problem: Problem
     coarse: Room
     fine: Room
     prior: Prior
     base: Attempt
+    first: Attempt
     jacobian: list[Prediction]
 
 
@@ -64,16 +65,19 @@ def solve_room(
 
 
 def begin(problem: Problem, settings: RoomSettings, tell: Event) -> Begun:
-    """What is the same for all images of a room: the coarse room as stated, and its derivatives."""
+    """What is the same for all images of a room: both grids as stated, and the coarse one's derivatives."""
     problem = with_plane_openings(problem)
     closure = closure_name(problem.scene)
     coarse, fine = (room(problem.scene, n, closure) for n in (settings.coarse_cells, settings.cells))
     vertices = (settings.vertices, settings.vertices, settings.vertices)
     prior = room_prior(problem, coarse.layout, log_viscosity_std=settings.log_viscosity_std)
     base = settled(coarse, prior, problem, settings, vertices, tell)
-    vector = np.zeros(len(prior.active()))
-    jacobian = perturbed(coarse, prior, vector, base, settings, vertices)
-    return Begun(problem, coarse, fine, prior, base, jacobian)
+    flow = carried_over(base.flow.last, coarse.grid, fine.grid)
+    first = attempt(fine, prior.mean, flow, settings.refine_s, vertices, tell)
+    jacobian = perturbed(coarse, prior, np.zeros(len(prior.active())), base, settings, vertices)
+    # As it looks after having settled for as long again.
+    base = Attempt(base.parameters, base.flow, jacobian[0])
+    return Begun(problem, coarse, fine, prior, base, first, jacobian)
 
 
 def finish(
@@ -87,8 +91,9 @@ def finish(
     data = observations(problem, vertices)
     vector, base, jacobian = coarse_fit(begun, data, settings, tell)
     other = otherwise_closed(coarse, prior.parameters(vector), base, settings, vertices)
-    flow = carried_over(base.flow.last, coarse.grid, fine.grid)
-    first = attempt(fine, prior.parameters(vector), flow, settings.refine_s, vertices, tell)
+    first, seconds = begun.first, settings.refine_s
+    if np.any(vector):
+        first = attempt(fine, prior.parameters(vector), first.flow.last, seconds, vertices, tell)
     posterior, best = fine_fit(fine, prior, data, vector, first, jacobian, settings, tell)
     solved = Solved(problem, data, prior, posterior, jacobian, other, first.seen, best, fine.layout)
     return solution(solved, time.perf_counter() - start_s, use_images=settings.use_images)
@@ -99,19 +104,19 @@ def coarse_fit(
 ) -> tuple[Vector, Attempt, list[Prediction]]:
     """Parameters that the coarse room asks for, the room under them, and the runs of its Jacobian.
 
+    What the coarse grid gets wrong is taken from the fine one under the stated parameters, so that it moves none.
     Far from where it was made a Jacobian misleads: it is made anew after every `settings.straight` prior deviations.
     """
     coarse, prior, base, jacobian = begun.coarse, begun.prior, begun.base, begun.jacobian
     vector = linearised = np.zeros(len(prior.active()))
+    finer = data.predicted(begun.first.seen) - data.predicted(base.seen)
     for n in range(settings.coarse_rounds if settings.use_images else 0):
-        # No second grid yet: half of the misfit is taken for the grid's.
-        half = 0.5 * (data.values()[0] - data.predicted(base.seen))
-        new = corrected(vector, base, data, jacobian, half, trusting=True).vector
+        new = corrected(vector, base, data, jacobian, finer, offset=finer, trusting=True).vector
         if float(np.abs(new - vector).max(initial=0.0)) < settings.coarse_step:
             break
         where, seconds = prior.parameters(new), settings.restart_s
         tried = attempt(coarse, where, base.flow.last, seconds, data.vertices, tell)
-        left = misfit_ratio(data, tried, base)
+        left = misfit_ratio(data, tried, base, finer)
         tell({"coarse_round": n + 1.0, "misfit_left": left, **fitted(prior, new)})
         if left > settings.worthwhile:
             break
@@ -164,21 +169,24 @@ def corrected(
     runs: list[Prediction],
     grid_difference: Float[np.ndarray, " data"],
     *,
+    offset: Float[np.ndarray, " data"] | float = 0.0,
     trusting: bool = False,
 ) -> Posterior:
-    """One Gauss-Newton step from `vector` by the misfit of `best`."""
+    """One Gauss-Newton step from `vector` by the misfit of `best`, `offset` added to what it shows."""
     values, variance, group = data.values()
     start = data.predicted(runs[0])
     jacobian = np.stack([(data.predicted(run) - start) / DIFFERENCE for run in runs[1:]], axis=1)
-    residual = values - data.predicted(best.seen)
+    residual = values - data.predicted(best.seen) - offset
     weights = weighted_variance(variance, group, residual, grid_difference)
     return gauss_newton(vector, residual, weights, jacobian, trusting=trusting)
 
 
-def misfit_ratio(data: Observations, new: Attempt, old: Attempt) -> float:
+def misfit_ratio(
+    data: Observations, new: Attempt, old: Attempt, offset: Float[np.ndarray, " data"] | float = 0.0
+) -> float:
     """Rms misfit of one attempt over another's, each kind of data weighted by the old one's."""
     values, variance, group = data.values()
-    after, before = (values - data.predicted(a.seen) for a in (new, old))
+    after, before = (values - data.predicted(a.seen) - offset for a in (new, old))
     weights = weighted_variance(variance, group, before, before)
     return float(np.sqrt(np.sum(after**2 / weights) / max(np.sum(before**2 / weights), 1e-30)))
 
