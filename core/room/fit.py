@@ -1,10 +1,10 @@
 """Gauss-Newton on a room's uncertain parameters, with a Jacobian from a coarser room.
 
-    minimise  |d - f(q)|^2 / (s^2 + r^2) / c  +  sum log(1 + q^2 / nu) (nu + 1)
+    minimise  |d - f(q)|^2 / (s^2 + r^2) / c  +  sum log(1 + q^2 / nu) (nu + 1),  nu = 1
 
 q are parameters in units of their prior deviations. s is each datum's noise, r what the grid cannot
 represent, estimated from the residual of each kind of data; c counts neighbouring data that err together.
-The prior is Student's: a supply that was entered wrongly by many sigma is let go, and said.
+The prior is Student's (Cauchy's): a supply that was entered wrongly by many sigma is let go, and said.
 """
 
 import equinox as eqx
@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 CORRELATED = 4.0
 # Errors of grid and closure reach over whole jets: the posterior counts that many times fewer data again.
 _COHERENT = 3.0
-_STUDENT_NU = 3.0
+_STUDENT_NU = 1.0
 _LONGEST_STEP = 3.0
 
 
@@ -40,14 +40,15 @@ def gauss_newton(
     """
     new, normal, prior = vector, np.eye(len(vector)), np.ones(len(vector))
     for _ in range(6):
-        prior = (_STUDENT_NU + 1.0) / (_STUDENT_NU + (0.0 if trusting else 1.0) * new**2)
+        prior = np.ones_like(new) if trusting else (_STUDENT_NU + 1.0) / (_STUDENT_NU + new**2)
         normal = (jacobian.T / variance) @ jacobian + np.diag(prior)
         gradient = (jacobian.T / variance) @ residual - prior * vector
         step = np.linalg.solve(normal, gradient)
         step = np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
         new = vector + step
     data = normal - np.diag(prior)
-    return Posterior(new, np.linalg.inv(data / _COHERENT + np.diag(prior)), np.sqrt(variance))
+    # A parameter that was let go is no more certain than its prior, were there no data; one near it no less.
+    return Posterior(new, np.linalg.inv(data / _COHERENT + np.eye(len(new))), np.sqrt(variance))
 
 
 def weighted_variance(

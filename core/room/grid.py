@@ -67,7 +67,7 @@ def _aligned(least: int, shares: list[float]) -> int:
     """The number of cells that leaves edges, at these shares of the axis, least far from faces in all."""
 
     def apart(cells: int) -> float:
-        return sum(abs(cells * share - round(cells * share)) for share in shares)
+        return sum((abs(cells * share - round(cells * share)) for share in shares), start=0.0)
 
     # Within a tenth of a cell an edge is as good as on the face.
     return min(range(least, least + least // 10 + 1), key=lambda cells: (round(apart(cells), 1), cells))

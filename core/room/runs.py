@@ -42,7 +42,7 @@ class RoomSettings:
     coarse_cells: int = 32
     vertices: int = 64
     rounds: int = 3
-    coarse_rounds: int = 4
+    coarse_rounds: int = 6
     coarse_step: float = 1.0
     worthwhile: float = 0.85
     straight: float = 4.0

@@ -1,14 +1,20 @@
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from core.geometry import Box, looking_along_y
+from core.problem import Problem
+from core.room.boundary import closed_room
 from core.room.closure import ConstantClosure, KEpsilonClosure
 from core.room.grid import room_grid
+from core.room.k_epsilon import wall_sources
 from core.room.level import layer_exchange_m3_s
 from core.room.march import advance_chunk
 from core.room.model import air_at_rest, room_model
 from core.room.pressure import divergence_per_s
+from core.room.prior import room_prior
 from core.room.setup import RoomParameters, boundary, room_layout
 from core.room.vertices import vertex_excess_k, vertex_velocity_m_s
 from core.scene import FixedTexture, Heater, Inlet, Outlet, Patch, Scene, View, Wall
@@ -55,6 +61,50 @@ def test_openings_keep_their_flow_and_momentum_on_any_grid():
         # Through the faces, and as a force on the first cells: together U^2 A.
         momentum = float((low.normal_m_s**2).sum()) * area + float(low.force_m_s2.sum()) * grid.volume_m3
         assert momentum == pytest.approx(0.25 * patch_m2, rel=1e-5)
+
+
+def test_a_grid_puts_faces_on_the_edges_of_openings_where_that_takes_few_more_cells():
+    box = Box(lower_m=(-1.2, -1.5, 0.0), upper_m=(2.9, 1.5, 3.0))
+
+    grid = room_grid(box, 48, ((), (-0.3, 0.3), (1.6, 1.8, 0.2, 0.6)))
+
+    for axis, edges in ((1, (-0.3, 0.3)), (2, (1.6, 1.8, 0.2, 0.6))):
+        for edge_m in edges:
+            assert np.abs(grid.faces_m(axis) - edge_m).min() < 1e-9
+    bare = room_grid(box, 48)
+    assert all(n <= m <= 1.1 * n for n, m in zip(bare.cells, grid.cells, strict=True))
+
+
+def test_a_free_surface_has_no_wall_function():
+    grid = room_grid(ROOM, 8)
+    k = jnp.full(grid.cells, 1e-3)
+    u, v, w = (jnp.full([n + (a == b) for b, n in enumerate(grid.cells)], 0.1, jnp.float32) for a in range(3))
+    velocity = (u, v, w)
+    still, free = closed_room(grid), closed_room(grid, grip=0.0)
+
+    touched, production, _ = wall_sources(k, velocity, still, grid, jnp.float32(1.5e-5))
+    assert float(touched[0, 0, 0]) == 3.0
+    assert float(touched[3, 3, 3]) == 0.0
+    assert float(production[0, 3, 3]) > 0.0
+
+    touched, production, epsilon = wall_sources(k, velocity, free, grid, jnp.float32(1.5e-5))
+    assert not bool(touched.any() | production.any() | epsilon.any())
+
+
+def test_walls_heat_follows_a_supply_that_is_moved_so_that_the_thermometer_stays():
+    walls = [Wall(wall=w, thermal="temperature", temperature_k=293.15) for w in ("x_max", "y_min", "y_max")]
+    walls += [Wall(wall=w, thermal="adiabatic") for w in ("x_min", "z_min", "z_max")]
+    outlet = dataclasses.replace(EXHAUST, mean_temperature_k=297.15)
+    problem = Problem(scene(SUPPLY, outlet, *walls), ())
+    prior = room_prior(problem, room_layout(problem.scene, room_grid(ROOM, 8)))
+    moved = np.zeros(len(prior.active()))
+    moved[prior.names().index("inlet_excess_k[0]")] = -10.0
+
+    stated, found = prior.parameters(np.zeros_like(moved)), prior.parameters(moved)
+
+    # The supply brings 10 - 4 K; moved, less by its ten deviations of 0.2 K.
+    gain = float(jnp.exp(found.wall_log_heat[1] - stated.wall_log_heat[1]))
+    assert gain == pytest.approx((10.0 - 2.0 - 4.0) / (10.0 - 4.0), rel=1e-4)
 
 
 def test_a_room_with_jet_outlet_and_heater_marches_without_divergence():
