@@ -1,10 +1,10 @@
 """Gauss-Newton on a room's uncertain parameters, with a Jacobian from a coarser room.
 
-    minimise  |d - f(q)|^2 / (s^2 + r^2) / c  +  sum log(1 + q^2 / nu) (nu + 1),  nu = 1
+    minimise  |d - f(q)|^2 / (s^2 + r^2) / c  +  sum log(1 + q^2 / nu) (nu + 1),  nu = 3
 
 q are parameters in units of their prior deviations. s is each datum's noise, r what the grid cannot
 represent, estimated from the residual of each kind of data; c counts neighbouring data that err together.
-The prior is Student's (Cauchy's): a supply that was entered wrongly by many sigma is let go, and said.
+The prior is Student's: a supply that was entered wrongly by many sigma is let go, and said.
 """
 
 import equinox as eqx
@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 CORRELATED = 4.0
 # Errors of grid and closure reach over whole jets: the posterior counts that many times fewer data again.
 _COHERENT = 3.0
-_STUDENT_NU = 1.0
+_STUDENT_NU = 3.0
 _LONGEST_STEP = 3.0
 
 

@@ -35,17 +35,19 @@ class RoomSettings:
 
     The coarse room is corrected while a parameter moves by more than `coarse_step` prior deviations and
     the misfit falls below `worthwhile` of what it was: a coarse grid's own error must not move the rest.
-    A Jacobian serves for `straight` prior deviations.
+    A Jacobian serves for `straight` prior deviations. The fine room's last march, the longest, follows a step below
+    `fine_step`.
     """
 
     cells: int = 48
     coarse_cells: int = 32
     vertices: int = 64
-    rounds: int = 3
+    rounds: int = 4
     coarse_rounds: int = 6
     coarse_step: float = 1.0
     worthwhile: float = 0.85
     straight: float = 4.0
+    fine_step: float = 0.3
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 60.0

@@ -91,8 +91,9 @@ def finish(
     data = observations(problem, vertices)
     vector, base, jacobian = coarse_fit(begun, data, settings, tell)
     other = otherwise_closed(coarse, prior.parameters(vector), base, settings, vertices)
-    first, seconds = begun.first, settings.refine_s
-    if np.any(vector):
+    first = begun.first
+    seconds = settings.refine_s if settings.use_images else settings.final_s
+    if np.any(vector) or not settings.use_images:
         first = attempt(fine, prior.parameters(vector), first.flow.last, seconds, vertices, tell)
     posterior, best = fine_fit(fine, prior, data, vector, first, jacobian, settings, tell)
     solved = Solved(problem, data, prior, posterior, jacobian, other, first.seen, best, fine.layout)
@@ -111,7 +112,8 @@ def coarse_fit(
     vector = linearised = np.zeros(len(prior.active()))
     finer = data.predicted(begun.first.seen) - data.predicted(base.seen)
     for n in range(settings.coarse_rounds if settings.use_images else 0):
-        new = corrected(vector, base, data, jacobian, finer, offset=finer, trusting=True).vector
+        # Where the parameters have moved, half of what was taken off may be wrong.
+        new = corrected(vector, base, data, jacobian, 0.5 * finer, offset=finer, trusting=True).vector
         if float(np.abs(new - vector).max(initial=0.0)) < settings.coarse_step:
             break
         where, seconds = prior.parameters(new), settings.restart_s
@@ -144,7 +146,9 @@ def fine_fit(
     grid_difference = data.predicted(first.seen) - data.predicted(jacobian[0])
     for n in range(settings.rounds if settings.use_images else 0):
         new = corrected(posterior.vector, best, data, jacobian, grid_difference)
-        seconds = settings.final_s if n == settings.rounds - 1 else settings.refine_s
+        step = float(np.abs(new.vector - posterior.vector).max(initial=0.0))
+        last = n == settings.rounds - 1 or step < settings.fine_step
+        seconds = settings.final_s if last else settings.refine_s
         where = prior.parameters(new.vector)
         tried = attempt(fine, where, best.flow.last, seconds, data.vertices, tell)
         left = misfit_ratio(data, tried, best)
@@ -153,6 +157,8 @@ def fine_fit(
             posterior = Posterior(posterior.vector, new.covariance, new.deviation)
             break
         posterior, best = new, tried
+        if last:
+            break
     return posterior, best
 
 
