@@ -90,6 +90,7 @@ def jet_row(fine: float) -> dict[str, float | str]:
         "measured_high": MEASURED_GROWTH[1],
         "centre_speed_at_30": float(u[round(30 * per_slot), 0]),
         "change": end.change,
+        "outcome": end.outcome.name,
         "cpu_s": time.process_time() - start_s,
     }
 
@@ -122,6 +123,7 @@ def tall_row(closure: Closure, fine: float) -> dict[str, float | str]:
         "w_profile": w_error,
         "w_peak": peak_error,
         "change": end.change,
+        "outcome": end.outcome.name,
         "cpu_s": time.process_time() - start_s,
     }
 
@@ -230,4 +232,5 @@ def _sentence(row: dict[str, float | str]) -> str:
             f"T {100 * float(row['T_profile']):.1f} % of the contrast, w {100 * float(row['w_profile']):.0f} % of "
             f"its peak (rms of the profiles); the peak {100 * float(row['w_peak']):+.0f} %"
         )
-    return f"{row['what']}, {row['closure']}, {row['cells']} cells: {said}; {float(row['cpu_s']):.0f} CPU s"
+    cost = f"{float(row['cpu_s']):.0f} CPU s, {row['outcome']}"
+    return f"{row['what']}, {row['closure']}, {row['cells']} cells: {said}; {cost}"

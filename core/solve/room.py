@@ -149,10 +149,16 @@ def fine_fit(
         step = float(np.abs(new.vector - posterior.vector).max(initial=0.0))
         last = n == settings.rounds - 1 or step < settings.fine_step
         seconds = settings.final_s if last else settings.refine_s
-        where = prior.parameters(new.vector)
-        tried = attempt(fine, where, best.flow.last, seconds, data.vertices, tell)
+        tried = attempt(fine, prior.parameters(new.vector), best.flow.last, seconds, data.vertices, tell)
         left = misfit_ratio(data, tried, best)
         tell({"round": n + 1.0, "misfit_left": left, **fitted(prior, new.vector)})
+        if left > _HARM:
+            # Half of a step that did harm: the derivatives are a coarser room's.
+            middle = 0.5 * (posterior.vector + new.vector)
+            new = Posterior(middle, new.covariance, new.deviation)
+            tried = attempt(fine, prior.parameters(middle), best.flow.last, seconds, data.vertices, tell)
+            left = misfit_ratio(data, tried, best)
+            tell({"round": n + 1.5, "misfit_left": left, **fitted(prior, middle)})
         if left > _HARM:
             posterior = Posterior(posterior.vector, new.covariance, new.deviation)
             break
