@@ -21,7 +21,7 @@ CORRECTION_SHARE = 0.3
 # Taken for the share of the images that is left unexplained where there are none.
 _UNSEEN_SHARE = 0.3
 # What grid, closure and scale leave open (a, c and b of `core.uncertainty`).
-_SHARES = {"excess_k": (0.1, 1.0, 0.2), "pressure_m2_s2": (0.3, 2.0, 5.0), "velocity_m_s": (0.3, 1.5, 0.65)}
+_SHARES = {"excess_k": (0.1, 1.0, 0.2), "pressure_m2_s2": (0.3, 2.0, 5.0), "velocity_m_s": (0.5, 2.0, 0.38)}
 
 
 class Solved(eqx.Module):
