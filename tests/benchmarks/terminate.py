@@ -41,7 +41,7 @@ def main() -> None:
         shutil.copytree(options.experiment, experiment)
         settings = experiment / "experiment.toml"
         settings.write_text(re.sub(r"grid = .*", f"grid = {options.cells}", settings.read_text()))
-        job = Attempts(Path(scratch) / "jobs", experiment, Path(scratch) / "cache", xla_flags="")
+        job = Attempts(Path(scratch) / "jobs", experiment, Path(scratch) / "cache")
         for steps in options.steps:
             with job.begin() as process:
                 reached = compiled(job, steps, options.limit_s)

@@ -19,8 +19,6 @@ from app.results import read_result
 from core.solve.checkpoint import decode
 
 ROOT = Path(__file__).parents[3]
-# Nearly all of the time goes into compiling; which bits come out is the same question for slower programs.
-QUICK = "--xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true"
 
 
 @pytest.fixture(scope="module")
@@ -39,13 +37,13 @@ def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
 class Attempts:
     """One job, run by a new process each time."""
 
-    def __init__(self, folder: Path, experiment: Path, cache: Path, xla_flags: str) -> None:
+    def __init__(self, folder: Path, experiment: Path, cache: Path) -> None:
         ledger = Ledger(folder)
         job = ledger.submit(JobSpec(kind="reconstruct", experiment=experiment, settings={"preset": "grid"}))
         self.folder, self.number = JobFolder(ledger.folder_of(job.id)), 0
         # What one process compiled the next ones need not.
         own = {"JAX_COMPILATION_CACHE_DIR": str(cache), "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}
-        self._environment = {**os.environ, **own, "XLA_FLAGS": xla_flags}
+        self._environment = {**os.environ, **own}
 
     def begin(self) -> subprocess.Popen:
         self.number += 1
@@ -68,7 +66,7 @@ class Attempts:
 
 
 def test_kill_9_in_the_middle_and_again_ends_bitwise_the_same(experiment: Path, tmp_path: Path):
-    job = Attempts(tmp_path / "killed", experiment, tmp_path / "cache", QUICK)
+    job = Attempts(tmp_path / "killed", experiment, tmp_path / "cache")
     with job.begin() as process:
         job.wait_for_a_checkpoint(process)
         process.send_signal(signal.SIGKILL)
@@ -81,7 +79,7 @@ def test_kill_9_in_the_middle_and_again_ends_bitwise_the_same(experiment: Path, 
         process.wait(200)
     assert process.returncode == DONE
 
-    whole = Attempts(tmp_path / "whole", experiment, tmp_path / "cache", QUICK)
+    whole = Attempts(tmp_path / "whole", experiment, tmp_path / "cache")
     with whole.begin() as process:
         process.wait(200)
     assert process.returncode == DONE
