@@ -50,6 +50,15 @@ def test_a_new_experiment_is_listed_connected_and_not_calibrated(airlens: Client
     assert airlens.experiment(experiment).uncalibrated == ["camera", "wall"]
 
 
+def test_the_board_is_kept_and_an_impossible_one_refused(airlens: Client, experiment: str):
+    board = {"kind": "charuco", "columns": 8, "rows": 5, "square_m": 0.05, "marker_m": 0.03}
+    kept = airlens.change_experiment(experiment, board=board).settings["rig"]["board"]
+    assert {name: kept[name] for name in board} == board
+    with pytest.raises(ServiceError, match="markers smaller than squares"):
+        airlens.change_experiment(experiment, board=board | {"marker_m": 0.2})
+    assert airlens.experiment(experiment).settings["rig"]["board"] == kept
+
+
 def test_a_simulated_rig_is_calibrated_in_one_step(airlens: Client, experiment: str):
     made = airlens.calibrate(experiment)
     assert [item.name for item in made.items][-1].startswith("response")
