@@ -26,7 +26,8 @@ def resolve(scene: Scene, flow: ExpectedFlow, signals: tuple[Signal, ...]) -> Re
     view = int(np.argmin([s.noise.mean_px for s in signals]))
     signal = signals[view]
     probe = probe_of(scene, view, flow, signal)
-    kind, steps, made = tracing(probe)
+    cells, closure = grid(scene, flow), transport(scene, flow)
+    kind, steps, made = tracing(probe, cells.value)
     rays = replace(scene.rays, tracer=kind, steps=steps)
     if isinstance(scene.light, ProjectedPattern):
         tracer = tracer_of(kind, steps, scene)
@@ -34,7 +35,6 @@ def resolve(scene: Scene, flow: ExpectedFlow, signals: tuple[Signal, ...]) -> Re
         rays = replace(rays, projector_order=order.value, irradiance=lit.value)
         made += [order, lit]
     cone, data = aperture(scene, view, signal), data_term(scene, view, signal)
-    cells, closure = grid(scene, flow), transport(scene, flow)
     settled = replace(
         scene,
         rays=replace(rays, aperture_cone=cone.value),

@@ -22,8 +22,7 @@ from core.render.shift import wall_offset_m
 from core.scene import Scene
 
 _RAYS = 1024
-# A quarter apart at most, so that the fewest steps that serve cost little less. Fewer than 16 would pass by
-# what is narrower than a sixteenth of the room, and a real flow is narrower than the expected one.
+# A quarter apart at most, so that the fewest steps that serve cost little less.
 _STEPS = (16, 19, 23, 27, 32, 38, 45, 54, 64, 76, 91, 108, 128, 152, 181, 215, 256)
 _MOST_ORDER = 3
 _TRACERS = {"straight": StraightTracer, "quasi_linear": QuasiLinearTracer, "nonlinear": NonlinearTracer}
@@ -70,13 +69,16 @@ def tracer_of(kind: str, steps: int, scene: Scene) -> AbstractRayTracer:
     return _TRACERS[kind](steps, scene.air.ambient_refractivity)
 
 
-def tracing(probe: Probe) -> tuple[str, int, list[Choice]]:
-    """Straight rays where many steps of them hold, else nonlinear; then the fewest steps that hold."""
+def tracing(probe: Probe, cells: int) -> tuple[str, int, list[Choice]]:
+    """Straight rays where many steps of them hold, else nonlinear; then the fewest steps that hold.
+
+    No fewer than one a cell of the answer's grid: a real flow is narrower than the expected one.
+    """
     scene = probe.scene
     dearest = _STEPS[-1] * 2
     exact = probe.shift_px(tracer_of("nonlinear", dearest, scene), 1)
     given, steps = scene.rays.tracer, scene.rays.steps
-    counts = _STEPS if steps == "auto" else (steps,)
+    counts = (cells, *(n for n in _STEPS if n > cells)) if steps == "auto" else (steps,)
 
     def bound_of(kind: str, count: int) -> float:
         return probe.bound(probe.shift_px(tracer_of(kind, count, scene), 1), exact)
