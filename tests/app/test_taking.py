@@ -74,7 +74,15 @@ def interrupted(until) -> None:
         time.sleep(0.01)
 
 
-def test_the_first_interrupt_asks_to_stop_and_the_second_ends():
+@pytest.fixture
+def python_s_own_handler():
+    """What a program starts with, whatever a test before has left."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_the_first_interrupt_asks_to_stop_and_the_second_ends(python_s_own_handler):
     with interruptible() as stopped:
         assert not stopped()
         interrupted(until=stopped)
