@@ -3,11 +3,13 @@
 import equinox as eqx
 import numpy as np
 from jaxtyping import Float
+from scipy.integrate import cumulative_trapezoid
 
+from core.air import GRAVITY_M_S2
 from core.problem import Problem
 from core.result import Solution
 from core.room.fit import Posterior
-from core.room.grid import AXES
+from core.room.grid import AXES, WALLS
 from core.room.observe import Observations, Prediction
 from core.room.prior import Prior
 from core.room.residue import temperature_correction
@@ -16,8 +18,6 @@ from core.room.sentences import balances, contradictions, misfit, undetermined
 from core.room.setup import RoomLayout
 from core.uncertainty import Deviation, Represented, deviation
 
-# Prior size of the temperature's last correction, as a share of the departure from the profile.
-CORRECTION_SHARE = 0.3
 # Taken for the share of the images that is left unexplained where there are none.
 _UNSEEN_SHARE = 0.3
 # What grid, closure and scale leave open (a, c and b of `core.uncertainty`).
@@ -45,7 +45,7 @@ def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
     residual = values - solved.data.predicted(best.seen)
     local_k = departure(best.seen.excess_k)
     change = temperature_correction(
-        solved.data, best.seen.excess_k, residual, CORRECTION_SHARE * local_k, local_k
+        solved.data, best.seen.excess_k, residual, local_k, level_std_k(solved), unknown_walls(solved.prior)
     )
     free = free_vertices(solved.layout, best.seen.excess_k.shape)
     excess = best.seen.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
@@ -60,7 +60,7 @@ def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
         y,
         z,
         problem.scene.air.ambient_temperature_k + excess,
-        best.seen.pressure_m2_s2,
+        best.seen.pressure_m2_s2 + carried_m2_s2(problem, z, excess - best.seen.excess_k),
         best.seen.velocity_m_s,
         temperature.std,
         pressure.std,
@@ -103,6 +103,26 @@ def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.n
     for wall in np.flatnonzero(layout.held):
         free[tuple((-1 if wall % 2 else 0) if a == wall // 2 else slice(None) for a in AXES)] = 0.0
     return free
+
+
+def carried_m2_s2(
+    problem: Problem, z_m: Float[np.ndarray, " vz"], warmer_k: Float[np.ndarray, "vx vy vz"]
+) -> Float[np.ndarray, " vz"]:
+    """Pressure over height that carries air which is warmer by this: dp/dz = g beta dT, its mean at each height."""
+    buoyancy = GRAVITY_M_S2 * problem.scene.air.expansion_per_k * warmer_k.mean((0, 1))
+    return cumulative_trapezoid(buoyancy, z_m, initial=0.0)
+
+
+def level_std_k(solved: Solved) -> float:
+    """How far what was stated leaves the level open: a room's temperature balances what nobody knows exactly."""
+    moved = [float((run.excess_k - solved.runs[0].excess_k).mean()) for run in solved.runs[1:]]
+    own = departure(solved.best.seen.excess_k)
+    return max(own, float(np.linalg.norm(moved)) / DIFFERENCE)
+
+
+def unknown_walls(prior: Prior) -> list[str]:
+    """Walls whose temperature is fitted."""
+    return [name for name, std in zip(WALLS, np.asarray(prior.std.wall_excess_k), strict=True) if std > 0]
 
 
 def departure(field: Float[np.ndarray, "vx vy vz"]) -> float:

@@ -155,12 +155,19 @@ class Observations(eqx.Module):
 
     def plane_values(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " blocks"]:
         """The planes' pooled temperatures in a room."""
-        parts = [np.zeros(0)]
+        return np.concatenate([np.zeros(0), *self._plane_parts(excess_k)])
+
+    def plane_blocks(self) -> list[int]:
+        """How many blocks each plane is pooled into."""
+        return [len(part) for part in self._plane_parts(np.zeros((2, 2, 2)))]
+
+    def _plane_parts(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> list[Float[np.ndarray, " blocks"]]:
+        parts = []
         for plane in self.planes:
             end = 0 if plane.wall.endswith("min") else -1
             wall = np.take(excess_k, end, axis=WALLS.index(plane.wall) // 2)
             parts.append(_plane_pool(plane, _on_plane(wall, plane, self.scene.room), self.scene))
-        return np.concatenate(parts)
+        return parts
 
 
 def observations(problem: Problem, vertices: tuple[int, int, int]) -> Observations:

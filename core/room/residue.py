@@ -3,16 +3,20 @@
     T <- T + sum c_ij b_i(x) b_j(z),   c ~ normal(0, K),   linear least squares on the last misfit
 
 A view's rays run along y, so a single view sees only the mean along them. K lets profiles of height err
-further than patches of the section, and the level of all furthest: images do not see it, thermometers
-do (a plane, an outlet's, sensors). Held walls keep their temperature. Velocity is left alone: nudging it to
-fit images does not repair it.
+further than patches of the section, and the level of all as far as what was stated leaves it open: images
+do not see it, thermometers do (a plane, an outlet's, sensors). A plane on a wall of unknown temperature lies
+in a layer that the room may have wrong everywhere alike. Held walls keep their temperature. Velocity is left
+alone: nudging it to fit images does not repair it.
 """
+
+from collections.abc import Collection
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import block_diag
 
 from core.room.fit import CORRELATED, spread
 from core.room.grid import AXES, WALLS
@@ -23,6 +27,9 @@ _LATTICE = (9, 11)
 _LENGTH_SHARE = 0.2
 # Of the misfit that is left, this share is taken for what no smooth correction can explain.
 _UNEXPLAINED = 0.5
+# As shares of the departures from a level: the correction's own, where images pull no further without harm;
+# how far air at one point is from its section; a plane's layer on a wall of unknown temperature.
+_DEPARTURE_SHARE, _POINT_SHARE, _LAYER_SHARE = 0.1, 0.3, 1.0
 
 
 class Correction(eqx.Module):
@@ -37,12 +44,13 @@ def temperature_correction(
     data: Observations,
     excess_k: Float[np.ndarray, "vx vy vz"],
     residual: Float[np.ndarray, " data"],
-    std_k: float,
+    departure_k: float,
     level_std_k: float,
+    unknown_walls: Collection[str] = (),
 ) -> Correction:
     """Fit the correction to `residual` (data minus prediction of `excess_k`).
 
-    `std_k` is the prior size of its departures from a level, `level_std_k` that of the level.
+    `departure_k` is the size of the room's departures from a level; `level_std_k` how far the level may be off.
     """
     nx, _, nz = excess_k.shape
     along_x, along_z = (
@@ -50,34 +58,43 @@ def temperature_correction(
         for m, n in zip(_LATTICE, (nx, nz), strict=True)
     )
     basis = np.einsum("xi,zj->ijxz", along_x, along_z).reshape(-1, nx, nz)
-    prior = _prior_k2(std_k) + level_std_k**2
     _, variance, group = data.values()
-    rows, weight, left = [], [], []
-    designs = (
+    prior = _prior_k2(_DEPARTURE_SHARE * departure_k) + level_std_k**2
+    layers = sum(plane.wall in unknown_walls for plane in data.planes)
+    layer = np.eye(layers) / (_LAYER_SHARE * departure_k) ** 2
+    known = np.asarray(block_diag(np.linalg.inv(prior), layer))
+    gained = np.zeros(len(known))
+    for g, design in (
         (0, _shift_design(data, excess_k, basis)),
         (1, _plane_design(data, excess_k, basis)),
         (2, _sensor_design(data)),
         (4, _outlet_design(data)),
-    )
-    for g, design in designs:
+    ):
         own = group == g
         if own.any():
             # A thermometer stands in one place, which no smooth correction describes.
             pooled = g <= 1
-            error = _UNEXPLAINED * spread(residual[own]) if pooled else std_k
-            rows.append(design)
-            left.append(residual[own])
-            weight.append(1.0 / (variance[own] + error**2) / (CORRELATED if pooled else 1.0))
-    if not rows:
-        flat = np.einsum("ixz,ij,jxz->xz", basis, prior, basis)
-        return Correction(np.zeros((nx, nz)), flat, flat)
-    design, left_over, w = np.concatenate(rows), np.concatenate(left), np.concatenate(weight)
-    covariance = np.linalg.inv(np.linalg.inv(prior) + (design.T * w) @ design)
-    coefficients = covariance @ ((design.T * w) @ left_over)
+            error = _UNEXPLAINED * spread(residual[own]) if pooled else _POINT_SHARE * departure_k
+            weight = 1.0 / (variance[own] + error**2) / (CORRELATED if pooled else 1.0)
+            extra = _layer_design(data, unknown_walls) if g == 1 else np.zeros((len(design), layers))
+            whole = np.concatenate([design, extra], axis=1)
+            known = known + (whole.T * weight) @ whole
+            gained = gained + (whole.T * weight) @ residual[own]
+    size = len(basis)
+    covariance = np.linalg.inv(known)
+    coefficients = (covariance @ gained)[:size]
     before, after = (
-        np.einsum("ixz,ixz->xz", basis, np.tensordot(c, basis, axes=1)) for c in (prior, covariance)
+        np.einsum("ixz,ixz->xz", basis, np.tensordot(c, basis, axes=1))
+        for c in (prior, covariance[:size, :size])
     )
     return Correction(np.tensordot(coefficients, basis, axes=1), before, after)
+
+
+def _layer_design(data: Observations, unknown_walls: Collection[str]) -> Float[np.ndarray, "data layers"]:
+    """Plane temperatures of every block per kelvin of the layer of each plane on an unknown wall."""
+    blocks = data.plane_blocks()
+    columns = np.repeat(np.eye(len(blocks)), blocks, axis=0)
+    return columns[:, [plane.wall in unknown_walls for plane in data.planes]]
 
 
 def _prior_k2(std_k: float) -> Float[np.ndarray, "lattice lattice"]:
@@ -98,7 +115,10 @@ def _sensor_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
 
 
 def _outlet_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
-    """The outlet's mean temperature per kelvin of every coefficient."""
+    """The outlet's mean temperature per kelvin of every coefficient: of the whole section at its height.
+
+    At its wall, which windows do not see, the correction is but the continuation of what is beside it.
+    """
     rows = [np.zeros((0, _LATTICE[0] * _LATTICE[1]))]
     for outlet in data.outlets:
         patch, wall = outlet.patch, WALLS.index(outlet.patch.wall)
@@ -109,7 +129,8 @@ def _outlet_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
         points[..., wall // 2] = (box.lower_m, box.upper_m)[wall % 2][wall // 2]
         points[..., first] = (patch.lower_m[0] + steps * (patch.upper_m[0] - patch.lower_m[0]))[:, None]
         points[..., second] = (patch.lower_m[1] + steps * (patch.upper_m[1] - patch.lower_m[1]))[None, :]
-        rows.append(_at_points(data, points.reshape(-1, 3)).mean(axis=0, keepdims=True))
+        row = _at_points(data, points.reshape(-1, 3)).mean(axis=0).reshape(_LATTICE)
+        rows.append(np.broadcast_to(row.sum(0) / _LATTICE[0], _LATTICE).reshape(1, -1))
     return np.concatenate(rows)
 
 

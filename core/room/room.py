@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from core.air import GRAVITY_M_S2
 from core.room.closure import (
     AbstractClosure,
     ConstantClosure,
@@ -56,7 +57,7 @@ class Room(eqx.Module):
             self.grid,
             boundary(self.layout, parameters),
             self._closure(jnp.exp(parameters.log_closure)),
-            buoyancy_m_s2_k=9.81 * air.expansion_per_k,
+            buoyancy_m_s2_k=GRAVITY_M_S2 * air.expansion_per_k,
             molecular_m2_s=air.kinematic_viscosity_m2_s,
             prandtl=air.prandtl,
             turbulent_prandtl=_TURBULENT_PRANDTL,
