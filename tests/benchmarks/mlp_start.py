@@ -20,6 +20,7 @@ from core.result import Solution
 from core.solve.loop import LoopSettings
 from core.solve.mlp import MlpSolveSettings, solve_mlp
 from core.solve.room import RoomSettings, solve_room
+from tests.benchmarks.options import whole_numbers
 
 
 def row(name: str, found: Solution, volume: RoomVolume, cpu_s: float) -> dict[str, Any]:
@@ -41,11 +42,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("truth", type=Path)
     parser.add_argument("--information", default="surveyed")
-    parser.add_argument("--steps", type=int, default=300)
-    parser.add_argument("--width", type=int, default=128)
-    parser.add_argument("--batch", type=int, default=2048)
-    parser.add_argument("--cells", type=int, default=32)
-    parser.add_argument("--coarse", type=int, default=24)
+    whole_numbers(parser, steps=300, width=128, batch=2048, cells=32, coarse=24)
     options = parser.parse_args()
     problem, volume = problem_of(options.truth, options.information, "texture", "paper", 0)
     began_s = time.process_time()

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 
 from core.boussinesq import Flow, Numbers, residuals
 from core.mlp import Mlp, MlpSettings, initial_mlp
+from tests.benchmarks.options import whole_numbers
 
 NUMBERS = Numbers(reynolds=1790.0, peclet=1516.0, richardson=4.02)
 
@@ -50,10 +51,7 @@ def measure(function, *arguments, repeats: int):
 def main() -> None:
     """Print one JSON line for each way and one for the ratio."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--points", type=int, default=8192)
-    parser.add_argument("--layers", type=int, default=4)
-    parser.add_argument("--width", type=int, default=128)
-    parser.add_argument("--repeats", type=int, default=5)
+    whole_numbers(parser, points=8192, layers=4, width=128, repeats=5)
     options = parser.parse_args()
     settings = MlpSettings(hidden_layers=options.layers, width=options.width)
     network = initial_mlp(settings, (0.0, 0.0, 0.0), (1.4, 1.0, 1.0), jax.random.key(0))

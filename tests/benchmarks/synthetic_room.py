@@ -23,6 +23,7 @@ from core.scene import FixedTexture, FlowModel, PlaneField, Scene, View, Wall
 from core.solve.frame import Frame, frame_of
 from core.solve.grid import GridSettings, solve_grid
 from core.solve.regime import DataModel
+from tests.benchmarks.options import whole_numbers
 
 INLET, OUTLET = ((0.35, 0.65), (0.65, 0.85)), ((0.35, 0.65), (0.05, 0.25))
 
@@ -166,12 +167,8 @@ def errors(found, truth: Staggered, grid: StaggeredGrid, frame: Frame) -> dict[s
 def main() -> None:
     """Solve once to compile and once to measure."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cells", type=int, default=32)
+    whole_numbers(parser, cells=32, march_steps=8000, coarsest=16, steps=3, cg_iterations=60)
     parser.add_argument("--reynolds", type=float, default=100.0)
-    parser.add_argument("--march-steps", type=int, default=8000)
-    parser.add_argument("--coarsest", type=int, default=16)
-    parser.add_argument("--steps", type=int, default=3)
-    parser.add_argument("--cg-iterations", type=int, default=60)
     options = parser.parse_args()
     problem, truth, grid = synthetic_problem(options.cells, options.reynolds, options.march_steps)
     left = discrete_residuals(truth, grid, frame_of(problem).numbers)
