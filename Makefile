@@ -3,6 +3,9 @@ BIN := .venv/bin
 UV := $(BIN)/uv pip
 CORES := $(shell nproc 2>/dev/null || echo 2)
 
+# Tests start many processes: what one has compiled of Python's sources the next ones need not.
+export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: demo test chromium check format bench lock setup
 setup: .venv/.installed
 

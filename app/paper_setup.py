@@ -24,10 +24,18 @@ PIXELS = 100
 SAMPLES = 2
 
 
-def paper_problem(volume: RoomVolume, *, seed: int) -> Problem:
-    """Images with the default camera's noise, the rendered data term, and the known plane."""
+def paper_problem(volume: RoomVolume, *, seed: int, image_std: float | None = None) -> Problem:
+    """Images, the rendered data term, and the known plane.
+
+    The pictures' difference scatters by `image_std` of full scale; None: by the default camera's noise. The
+    publication names no noise.
+    """
     options = RigOptions(
-        camera_px=(PIXELS, PIXELS), light="projector", stand_off_m=30.5, baseline_m=(1.0, 0.0)
+        camera_px=(PIXELS, PIXELS),
+        light="projector",
+        stand_off_m=30.5,
+        baseline_m=(1.0, 0.0),
+        border_px=0,
     )
     made = room_scene(volume, options, "paper")
     scene = Scene(
@@ -41,12 +49,16 @@ def paper_problem(volume: RoomVolume, *, seed: int) -> Problem:
     generator = np.random.default_rng(seed)
     offsets = _triangular(generator, (PIXELS, PIXELS, SAMPLES, 2))
     reference, flow = _images(scene, fine_field(volume, scene), offsets)
-    noise = scene.views[0].noise
-    # Shot noise of the mean frame; both images carry it.
-    variance = 2 * float(reference.mean()) / noise.full_well_e / scene.views[0].frames
-    noisy = flow + variance**0.5 * generator.standard_normal(flow.shape)
-    pair = ImagePair(reference, noisy, variance, offsets)
+    std = _camera_std(scene, reference) if image_std is None else image_std
+    noisy = flow + std * generator.standard_normal(flow.shape)
+    pair = ImagePair(reference, noisy, std**2, offsets)
     return Problem(scene, (), known_planes(volume, scene), images=(pair,))
+
+
+def _camera_std(scene: Scene, picture: Float[np.ndarray, "rows cols"]) -> float:
+    """Shot noise of a mean frame, full scale 1; both images carry it."""
+    view = scene.views[0]
+    return (2 * float(picture.mean()) / view.noise.full_well_e / view.frames) ** 0.5
 
 
 def _triangular(generator: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:

@@ -34,6 +34,7 @@ RigName = Literal["paper", "lab"]
 
 # The camera sees this much of the wall beyond the room on each side: a border that no flow moves.
 BORDER = 0.03
+# Two windows, and the gradient's reach at the picture's edge.
 BORDER_PX = 36
 # Finest period of a printed pattern, in pattern pixels (half a camera pixel each).
 FINEST_PX = 10.0
@@ -55,7 +56,10 @@ RIG_PLACES: Mapping[RigName, tuple[float, Vector2]] = {"paper": (30.5, (1.0, 0.0
 
 @dataclass(frozen=True)
 class RigOptions:
-    """The rig to simulate. Lengths in metres; `baseline_m` is projector minus camera (x, z)."""
+    """The rig to simulate. Lengths in metres; `baseline_m` is projector minus camera (x, z).
+
+    The picture reaches `border_px` beyond the wall at least, which windows need and single pixels do not.
+    """
 
     camera_px: tuple[int, int] = (4096, 3072)
     light: Literal["texture", "projector"] = "texture"
@@ -65,6 +69,7 @@ class RigOptions:
     baseline_m: Vector2 = RIG_PLACES["paper"][1]
     projector_px: tuple[int, int] = (1920, 1200)
     pattern_seed: int = 0
+    border_px: int = BORDER_PX
 
     def __post_init__(self) -> None:
         if self.frames < 1 or self.full_well_e <= 0 or min(self.camera_px) < 16:
@@ -82,7 +87,7 @@ def room_scene(volume: RoomVolume, options: RigOptions, information: Information
             f"The stand-off is {options.stand_off_m:g} m; expected the distance from camera to back wall, "
             "above 0."
         )
-    camera = _covering(room, options.camera_px, options.stand_off_m, (0.0, 0.0))
+    camera = _covering(room, options.camera_px, options.border_px, options.stand_off_m, (0.0, 0.0))
     noise = CameraNoise(full_well_e=options.full_well_e)
     return Scene(
         room=room,
@@ -145,11 +150,12 @@ def _air(volume: RoomVolume) -> Air:
     )
 
 
-def _covering(room: Box, size_px: tuple[int, int], stand_off_m: float, baseline_m: Vector2) -> Optics:
+def _covering(
+    room: Box, size_px: tuple[int, int], border_px: int, stand_off_m: float, baseline_m: Vector2
+) -> Optics:
     """Optics at the stand-off whose panel covers the back wall and a border; shifted like a lens, not tilted."""
     centre = room.centre_m
-    # Room for two windows beside the wall, and for the gradient's reach at the picture's edge.
-    border = max(BORDER, BORDER_PX / size_px[0])
+    border = max(BORDER, border_px / size_px[0])
     width, height = (room.size_m[axis] * (1 + 2 * border) for axis in (0, 2))
     focal_px = stand_off_m * min(size_px[0] / width, size_px[1] / height)
     position: Vector3 = (
@@ -179,7 +185,9 @@ def _light(room: Box, camera: Optics, options: RigOptions) -> Light:
         return FixedTexture(
             pattern=WaveletPattern(seed=options.pattern_seed, finest_px=FINEST_PX), pixel_m=pixel_m / 2
         )
-    projector = _covering(room, options.projector_px, options.stand_off_m, options.baseline_m)
+    projector = _covering(
+        room, options.projector_px, options.border_px, options.stand_off_m, options.baseline_m
+    )
     # The finest band: at least 2 projector pixels and at least 3 camera pixels.
     magnification = camera.focal_px[0] / projector.focal_px[0]
     finest = max(2.0, 3.0 / magnification)

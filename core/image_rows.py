@@ -41,7 +41,7 @@ def warped_rows(scene: Scene, view: int, pair: ImagePair, shape: tuple[int, int,
         [ndimage.correlate1d(mean, taps, axis=axis, mode="nearest").ravel() for axis in (1, 0)], axis=1
     )
     difference = (pair.flow_image - pair.reference_image).ravel()
-    return _rows(scene, view, shape, _pixels(rows, cols), gradient, difference, pair, 1)
+    return _rows(scene, view, shape, pixel_centres(rows, cols), gradient, difference, pair, 1)
 
 
 def rendered_rows(scene: Scene, view: int, pair: ImagePair, shape: tuple[int, int, int]) -> ShiftRows:
@@ -52,7 +52,8 @@ def rendered_rows(scene: Scene, view: int, pair: ImagePair, shape: tuple[int, in
             "Take data_term = 'warped' or 'displacement' for measured images."
         )
     rows, cols, samples, _ = pair.sample_offsets_px.shape
-    positions = (_pixels(rows, cols)[:, None] + pair.sample_offsets_px.reshape(-1, samples, 2)).reshape(-1, 2)
+    offsets = pair.sample_offsets_px.reshape(-1, samples, 2)
+    positions = (pixel_centres(rows, cols)[:, None] + offsets).reshape(-1, 2)
     geometry = pixel_geometry(scene, view, positions)
     luminance, gradient = _model(jnp.asarray(pattern_image(scene)), geometry)
     reference = np.asarray(luminance, np.float64).reshape(-1, samples).mean(1)
@@ -96,6 +97,7 @@ def _rows(
     )
 
 
-def _pixels(rows: int, cols: int) -> Float[np.ndarray, "pixels 2"]:
+def pixel_centres(rows: int, cols: int) -> Float[np.ndarray, "pixels 2"]:
+    """Sensor positions (column, row) in the order of the rows."""
     row, column = np.mgrid[0:rows, 0:cols]
     return np.stack([column.ravel(), row.ravel()], axis=1).astype(float)

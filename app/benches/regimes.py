@@ -38,6 +38,9 @@ def regimes(
     out: Out = Path("bench"),
     setup: Annotated[str, typer.Option(help="paper, texture or projector.")] = "paper",
     information: Information = "paper",
+    image_std: Annotated[
+        float | None, typer.Option(help="Of the paper set-up's pictures, full scale 1; else the camera's.")
+    ] = None,
     method: Annotated[str, typer.Option(help="grid or mlp.")] = "grid",
     cells: Annotated[int, typer.Option(help="Cells an axis of the grid.")] = 64,
     network_steps: Annotated[int, typer.Option(help="Steps of the network, for each regime.")] = 500,
@@ -50,8 +53,11 @@ def regimes(
 ) -> None:
     """Each regime of losses on one volume: errors of T, p, u, and pictures of truth, prediction and error."""
     truth = read_volume(volume)
-    problem = _problem(truth, setup, information)
-    name = f"regimes_{setup}_{information}_{method}"
+    problem = _problem(truth, setup, information, image_std)
+    size = cells if method == "grid" else network_steps
+    name = f"regimes_{setup}_{information}_{method}_{size}" + (
+        "" if image_std is None else f"_std_{image_std:g}"
+    )
     lines: list[dict[str, Any]] = []
     found: dict[Regime, Solution] = {}
     chosen: list[Regime] = [regime for regime in REGIMES if not only or str(regime) in only]
@@ -66,7 +72,8 @@ def regimes(
             loop = LoopSettings(steps=network_steps, time_limit_s=limit_s)
             found[regime] = solve_mlp(problem, network(regime, 4, width, batch, loop, rays))
         cpu_s = round(time.process_time() - began, 1)
-        point = {"setup": setup, "information": information, "method": method, "regime": regime}
+        point = {"setup": setup, "information": information, "image_std": image_std}
+        point |= {"method": method, "size": size, "regime": regime}
         cost = {"solver_s": round(found[regime].solver_s, 1), "cpu_s_with_compilation": cpu_s}
         ended = {"outcome": found[regime].outcome.name, "iterations": _iterations(found[regime])}
         lines.append(
@@ -78,9 +85,9 @@ def regimes(
     draw(out / f"{name}.png", truth, found)
 
 
-def _problem(truth: RoomVolume, setup: str, information: str) -> Problem:
+def _problem(truth: RoomVolume, setup: str, information: str, image_std: float | None) -> Problem:
     if setup == "paper":
-        return paper_problem(truth, seed=0)
+        return paper_problem(truth, seed=0, image_std=image_std)
     if setup not in ("texture", "projector") or information not in ("paper", "operator", "surveyed"):
         raise BadInputError(
             f"Set-up {setup!r} with information {information!r}: expected paper, texture or projector with "

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from core.boundary import boundary_loss, level_loss, point_losses
-from core.image_rows import rendered_rows, warped_rows
+from core.image_rows import pixel_centres, rendered_rows, warped_rows
 from core.losses import Loss, PhysicsLoss, PriorLoss, SmoothnessLoss
-from core.problem import Problem, ShiftMeasurement
+from core.problem import ImagePair, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.rays.optics import pinhole
 from core.scene import Scene
@@ -111,10 +111,12 @@ def image_loss(
     """The data term of every view, as the scene names it; `auto` takes the windows' displacements."""
     scene = problem.scene
     match scene.solve.data_term:
-        case "rendered":
-            views = [rendered_rows(scene, v, pair, shape) for v, pair in enumerate(problem.images)]
-        case "warped":
-            views = [warped_rows(scene, v, pair, shape) for v, pair in enumerate(problem.images)]
+        case "rendered" | "warped" as term:
+            rows = rendered_rows if term == "rendered" else warped_rows
+            views = [
+                _inner(rows(scene, v, pair, shape), scene, v, pair, data)
+                for v, pair in enumerate(problem.images)
+            ]
         case _:
             views = [_windows(problem, v, data, shape) for v in range(len(problem.shifts))]
     return ShiftLoss(tuple(views), frame.vertices(shape), frame.scales, scene.air, weight)
@@ -132,6 +134,13 @@ def traced_loss(problem: Problem, frame: Frame, weight: float, data: DataModel, 
     return TracedLoss(tuple(views), frame.scales, scene.air, scene.room.lower_m, steps, weight)
 
 
+def _inner(rows: ShiftRows, scene: Scene, view: int, pair: ImagePair, data: DataModel) -> ShiftRows:
+    """The rows of the pixels beside which there is no layer thinner than a cell."""
+    centres_px = pixel_centres(*pair.flow_image.shape)
+    used = _away_from_walls(scene, view, centres_px, data.margin, np.ones(len(centres_px), bool))
+    return rows.chosen(jnp.asarray(np.flatnonzero(used)))
+
+
 def _windows(problem: Problem, view: int, data: DataModel, shape: tuple[int, int, int]) -> ShiftRows:
     kept, model_std_px = _kept_windows(problem, view, data)
     camera = problem.scene.views[view].camera
@@ -144,12 +153,7 @@ def _kept_windows(problem: Problem, view: int, data: DataModel) -> tuple[ShiftMe
     """Windows that this model can hold, and its representation error in px."""
     shift = problem.shifts[view]
     used, model_std_px = _usable(shift, data)
-    used &= _away_from_walls(problem.scene, view, shift.centres_px, data.margin)
-    if not used.any():
-        raise SettingError(
-            f"View {problem.scene.views[view].name!r} sees nothing of the room away from its walls. "
-            "Check that the back wall is inside the picture."
-        )
+    used = _away_from_walls(problem.scene, view, shift.centres_px, data.margin, used)
     kept = ShiftMeasurement(
         shift.centres_px[used],
         shift.displacement_px[used],
@@ -171,17 +175,26 @@ def _usable(shift: ShiftMeasurement, data: DataModel) -> tuple[np.ndarray, float
 
 
 def _away_from_walls(
-    scene: Scene, view: int, centres_px: Float[np.ndarray, "windows 2"], margin: float
-) -> Bool[np.ndarray, " windows"]:
-    """Whether a window's place on the back wall is further than `margin` from the wall's edges."""
+    scene: Scene,
+    view: int,
+    centres_px: Float[np.ndarray, "places 2"],
+    margin: float,
+    used: Bool[np.ndarray, " places"],
+) -> Bool[np.ndarray, " places"]:
+    """Which of those used lie further than `margin` from the back wall's edges. Raises SettingError if none."""
     lens, room = scene.views[view].camera, scene.room
     directions = np.asarray(
         jax.vmap(pinhole(lens).direction)(jnp.asarray(centres_px, jnp.float32)), np.float64
     )
     reach = (room.upper_m[1] - lens.position_m[1]) / np.maximum(directions[:, 1], 1e-9)
     points = np.array(lens.position_m) + reach[:, None] * directions
-    inside = np.ones(len(centres_px), bool)
+    inside = used.copy()
     for axis in (0, 2):
         gap = margin * room.size_m[axis]
         inside &= (points[:, axis] > room.lower_m[axis] + gap) & (points[:, axis] < room.upper_m[axis] - gap)
+    if not inside.any():
+        raise SettingError(
+            f"View {scene.views[view].name!r} sees nothing of the room away from its walls. "
+            "Check that the back wall is inside the picture."
+        )
     return inside
