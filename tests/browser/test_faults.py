@@ -114,8 +114,12 @@ def test_a_worker_that_is_killed_and_a_service_that_is_restarted(station: Statio
     second = worker_of(attempts / "0002")
     station.stop()
     expect(page.locator("footer")).to_contain_text("service not reached")
+    go_to(page, "Rig")
+    go_to(page, "Reconstruct")
+    expect(page.locator("fieldset")).to_contain_text("Reading the presets")
     station.start()
     expect(page.locator("footer")).to_contain_text("service connected")
+    expect(page.get_by_role("radio")).to_have_count(5)
     expect(queue.locator(".light")).to_have_text("done")
     expect(queue).to_contain_text("attempt 2")
     assert read_json(attempts / "0002" / "worker.json")["pid"] == second
