@@ -72,7 +72,7 @@ def regimes(
             loop = LoopSettings(steps=network_steps, time_limit_s=limit_s)
             found[regime] = solve_mlp(problem, network(regime, 4, width, batch, loop, rays))
         cpu_s = round(time.process_time() - began, 1)
-        point = {"setup": setup, "information": information, "image_std": image_std}
+        point = {"setup": setup, "information": information, **_pictures(problem)}
         point |= {"method": method, "size": size, "regime": regime}
         cost = {"solver_s": round(found[regime].solver_s, 1), "cpu_s_with_compilation": cpu_s}
         ended = {"outcome": found[regime].outcome.name, "iterations": _iterations(found[regime])}
@@ -94,6 +94,19 @@ def _problem(truth: RoomVolume, setup: str, information: str, image_std: float |
             "paper, operator or surveyed."
         )
     return synthetic_problem(truth, RigOptions(light=setup), information, window_px=32, seed=0)  # type: ignore[arg-type]
+
+
+def _pictures(problem: Problem) -> dict[str, float]:
+    """Where pictures are the data: their noise, and the median change of a lit pixel with it, full scale 1."""
+    if not problem.images:
+        return {}
+    pair = problem.images[0]
+    lit = pair.reference_image > 0
+    change = np.median(np.abs(pair.flow_image - pair.reference_image)[lit])
+    return {
+        "image_std": float(f"{pair.difference_variance**0.5:.3g}"),
+        "image_change": float(f"{change:.3g}"),
+    }
 
 
 def _iterations(found: Solution) -> int:
