@@ -34,9 +34,9 @@ from core.scene import Scene
 
 Vector = Float[np.ndarray, " active"]
 
-# A correction that leaves more than this of the misfit did harm: the room before it is kept. Below it, the
-# room may only not have settled yet.
-_HARM = 1.5
+# A correction that leaves more than this of the least misfit so far did harm: the room before it is kept. Below
+# it, the room may only not have settled yet; the one that is given back leaves no more than `_WORSE` of the least.
+_HARM, _WORSE = 1.5, 1.15
 
 
 class Begun(eqx.Module):
@@ -141,8 +141,8 @@ def fine_fit(
     tell: Event,
 ) -> tuple[Posterior, Attempt]:
     """The fine room's parameters and the best of its marches; as stated where images are not to be used."""
-    best = first
-    posterior = Posterior(vector, np.eye(len(vector)), np.zeros(0))
+    best = least = first
+    posterior = at_least = Posterior(vector, np.eye(len(vector)), np.zeros(0))
     grid_difference = data.predicted(first.seen) - data.predicted(jacobian[0])
     for n in range(settings.rounds if settings.use_images else 0):
         new = corrected(posterior.vector, best, data, jacobian, grid_difference)
@@ -150,21 +150,25 @@ def fine_fit(
         last = n == settings.rounds - 1 or step < settings.fine_step
         seconds = settings.final_s if last else settings.refine_s
         tried = attempt(fine, prior.parameters(new.vector), best.flow.last, seconds, data.vertices, tell)
-        left = misfit_ratio(data, tried, best)
+        left = misfit_ratio(data, tried, least)
         tell({"round": n + 1.0, "misfit_left": left, **fitted(prior, new.vector)})
         if left > _HARM:
             # Half of a step that did harm: the derivatives are a coarser room's.
             middle = 0.5 * (posterior.vector + new.vector)
             new = Posterior(middle, new.covariance, new.deviation)
             tried = attempt(fine, prior.parameters(middle), best.flow.last, seconds, data.vertices, tell)
-            left = misfit_ratio(data, tried, best)
+            left = misfit_ratio(data, tried, least)
             tell({"round": n + 1.5, "misfit_left": left, **fitted(prior, middle)})
         if left > _HARM:
             posterior = Posterior(posterior.vector, new.covariance, new.deviation)
             break
         posterior, best = new, tried
+        if left < 1.0:
+            at_least, least = new, tried
         if last:
             break
+    if misfit_ratio(data, best, least) > _WORSE:
+        return Posterior(at_least.vector, posterior.covariance, posterior.deviation), least
     return posterior, best
 
 

@@ -1,6 +1,7 @@
 import dataclasses
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ from core.geometry import Box, looking_along_y
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.result import Solution
+from core.room.observe import observations
 from core.scene import FixedTexture, FlowModel, Inlet, Outlet, Patch, Scene, View, Wall
-from core.solve.room import RoomSettings, solve_room
+from core.solve.room import RoomSettings, begin, fine_fit, misfit_ratio, solve_room
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(2.0, 2.0, 2.0))
 SUPPLY = Inlet(
@@ -89,3 +91,19 @@ def test_images_repair_a_supply_that_was_entered_wrongly(truth: Solution):
     assert any("than the 305.15 K entered" in note for note in found.notes)
     assert found.temperature_std_k.min() > 0
     assert found.informed.max() > 0.3
+
+
+def test_derivatives_that_point_the_wrong_way_leave_a_room_no_worse_than_stated(truth: Solution):
+    wrong = dataclasses.replace(SUPPLY, temperature_k=304.15, velocity_m_s=(0.44, 0.0, 0.0))
+    problem = measured(wrong, truth, 1e-5)
+    begun = begin(problem, SETTINGS, lambda _: None)
+    data = observations(problem, (SETTINGS.vertices,) * 3)
+    start, *moved = begun.jacobian
+    turned = [start, *(jax.tree.map(lambda a, b: 2 * a - b, start, run) for run in moved)]
+    told: list[dict] = []
+    vector = np.zeros(len(begun.prior.active()))
+    settings = dataclasses.replace(SETTINGS, rounds=2, final_s=10.0)
+    _, best = fine_fit(begun.fine, begun.prior, data, vector, begun.first, turned, settings, told.append)
+
+    assert max(event.get("misfit_left", 0.0) for event in told) > 1.15
+    assert misfit_ratio(data, best, begun.first) <= 1.15
