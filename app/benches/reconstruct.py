@@ -49,43 +49,56 @@ def reconstruct(
     lines = run_grid(problem, truth, regime, cells)  # type: ignore[arg-type]
     loop = LoopSettings(record_every=20, time_limit_s=network_s)
     lines += run_network(problem, truth, network(regime, layers, width, batch, loop))
+    lines.append(_ratio(lines))
     _write(out, lines, truth, information, light)
-    for line in [*lines, _ratio(lines)]:
+    for line in lines:
         typer.echo(json.dumps(line) if as_json else "  ".join(f"{k} {v}" for k, v in line.items()))
+
+
+class _Curve:
+    """One line a record; the time of scoring is left out."""
+
+    def __init__(self, truth: RoomVolume, **point: Any) -> None:
+        self.lines: list[dict[str, Any]] = []
+        self._truth, self._point, self._began_s = truth, point, time.process_time()
+
+    def begin(self, **more: Any) -> None:
+        """Now, knowing this besides."""
+        self._point |= more
+        self._began_s = time.process_time()
+
+    def watch(self, found: Solution) -> None:
+        """Score a state on the way."""
+        now_s = time.process_time()
+        cpu_s = round(now_s - self._began_s, 2)
+        self.lines.append({**self._point, "cpu_s": cpu_s, **errors(found, self._truth)})
+        self._began_s += time.process_time() - now_s
 
 
 def run_grid(problem: Problem, truth: RoomVolume, regime: Regime, cells: int) -> list[dict[str, Any]]:
     """Twice: the first run compiles."""
     settings = GridSettings(regime=regime, cells=cells, coarsest=min(cells, 32))
-    began = time.process_time()
-    solve_grid(problem, settings)
-    with_compilation_s = time.process_time() - began
-    began = time.process_time()
-    found = solve_grid(problem, settings)
-    cpu_s = time.process_time() - began
-    point = {"method": "grid", "cells": cells, "compile_s": round(with_compilation_s - cpu_s, 2)}
-    return [{**point, "cpu_s": round(cpu_s, 2), **errors(found, truth), "outcome": found.outcome.name}]
+    compiling, curve = (_Curve(truth, method="grid", cells=cells) for _ in range(2))
+    solve_grid(problem, settings, watch=compiling.watch)
+    curve.begin()
+    found = solve_grid(problem, settings, watch=curve.watch)
+    compile_s = round(compiling.lines[-1]["cpu_s"] - curve.lines[-1]["cpu_s"], 2)
+    curve.watch(found)
+    curve.lines[-1] |= {"compile_s": compile_s, "outcome": found.outcome.name}
+    return curve.lines
 
 
 def run_network(problem: Problem, truth: RoomVolume, settings: MlpSolveSettings) -> list[dict[str, Any]]:
-    """One point a record; the time of scoring is left out."""
-    lines: list[dict[str, Any]] = []
-    clock = {"start": 0.0}
+    """Compiled before it begins."""
+    curve = _Curve(truth, method="mlp")
 
     def tell(event: dict[str, Any]) -> None:
         if event["kind"] == "start":
-            clock["start"] = time.process_time()
-            clock["compile"] = event["compile_s"]
+            curve.begin(compile_s=round(event["compile_s"], 2))
 
-    def watch(found: Solution) -> None:
-        now = time.process_time()
-        point = {"method": "mlp", "cpu_s": round(now - clock["start"], 2), **errors(found, truth)}
-        lines.append({**point, "compile_s": round(clock["compile"], 2)})
-        clock["start"] += time.process_time() - now
-
-    found = solve_mlp(problem, settings, on_event=tell, watch=watch)
-    lines.append({"method": "mlp best", **errors(found, truth), "outcome": found.outcome.name})
-    return lines
+    found = solve_mlp(problem, settings, on_event=tell, watch=curve.watch)
+    best = {"method": "mlp best", **errors(found, truth), "outcome": found.outcome.name}
+    return [*curve.lines, best]
 
 
 def errors(found: Solution, truth: RoomVolume) -> dict[str, Any]:
@@ -113,19 +126,18 @@ def trivial(found: Solution, truth: RoomVolume) -> dict[str, Any]:
 
 
 def _ratio(lines: list[dict[str, Any]]) -> dict[str, Any]:
-    """How much sooner the grid has the error that the network ends with."""
-    grid = next(line for line in lines if line["method"] == "grid")
-    curve = [line for line in lines if line["method"] == "mlp"]
-    reached = [line["cpu_s"] for line in curve if line["T_K"] <= grid["T_K"]]
-    spent = max((line["cpu_s"] for line in curve), default=0.0)
+    """How much sooner the grid has the least error that both have, and what it has at its end."""
+    grid, network = ([line for line in lines if line["method"] == name] for name in ("grid", "mlp"))
+    same_k = max(min(line["T_K"] for line in way) for way in (grid, network))
+    spent = [next(line["cpu_s"] for line in way if line["T_K"] <= same_k) for way in (grid, network)]
     return {
-        "grid_T_K": grid["T_K"],
-        "grid_cpu_s": grid["cpu_s"],
-        "mlp_reached": bool(reached),
-        "mlp_cpu_s": reached[0] if reached else spent,
-        "ratio" if reached else "ratio_at_least": round(
-            (reached[0] if reached else spent) / grid["cpu_s"], 1
-        ),
+        "method": "grid before mlp",
+        "T_K": same_k,
+        "grid_cpu_s": spent[0],
+        "mlp_cpu_s": spent[1],
+        "ratio": round(spent[1] / spent[0], 1),
+        "end_of_grid": {name: grid[-1][name] for name in ("T_K", "cpu_s")},
+        "end_of_mlp": {name: network[-1][name] for name in ("T_K", "cpu_s")},
     }
 
 
@@ -138,10 +150,9 @@ def _write(out: Path, lines: list[dict[str, Any]], truth: RoomVolume, informatio
     with durable_path(out / "lines.jsonl") as path:
         path.write_text("".join(json.dumps(line) + "\n" for line in lines))
     figure, axes = pyplot.subplots(figsize=(6, 4), constrained_layout=True)
-    curve = [line for line in lines if line["method"] == "mlp"]
-    axes.plot([line["cpu_s"] for line in curve], [line["T_K"] for line in curve], label="mlp")
-    grid = [line for line in lines if line["method"] == "grid"]
-    axes.plot([line["cpu_s"] for line in grid], [line["T_K"] for line in grid], "o", label="grid")
+    for name, mark in (("mlp", "-"), ("grid", "o-")):
+        way = [line for line in lines if line["method"] == name]
+        axes.plot([line["cpu_s"] for line in way], [line["T_K"] for line in way], mark, label=name)
     axes.set(xscale="log", yscale="log", xlabel="solver CPU seconds", ylabel="T rms error [K]")
     axes.set_title(f"{information} information, {light}, ambient {truth.ambient_k:.2f} K")
     axes.legend()
