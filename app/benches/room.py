@@ -18,6 +18,8 @@ import typer
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
+from app.errors import AirlensError
+from core.result import Outcome
 from core.room.boundary import Boundary, WallPlane, closed_room
 from core.room.closure import ConstantClosure
 from core.room.grid import RoomGrid
@@ -124,6 +126,8 @@ def centre_line(reynolds: float, cells: int, deep: int) -> Float[np.ndarray, " c
     model = _model(grid, Boundary((x, y, (z[0], lid))), 1.0 / reynolds, 0.0)
     settings = MarchSettings(longest_s=100.0, tolerance=3e-4, level_ahead_s=0.0)
     end = march(air_at_rest(model, jnp.zeros(grid.cells), 0.1), model, settings)
+    if end.outcome is Outcome.nonfinite:
+        raise AirlensError(f"The cavity at Re {reynolds:g} on {cells} cells diverged: {end.outcome.value}")
     return np.asarray(end.last.velocity[0], np.float64)[cells // 2, -1]
 
 

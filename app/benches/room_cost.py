@@ -1,8 +1,9 @@
 """airlens bench room-cost: what one march of a room costs, and what the derivatives of its parameters cost.
 
-A march runs from air at rest with the plane's profile until the standard preset would stop it. Derivatives
-are restarts of the settled room with one parameter moved each, as the fit makes them; with two threads
-they run beside each other.
+A march runs from air at rest with the plane's profile until the standard preset would stop it; another starts
+from a coarse room that has settled, as a reconstruction's does. Beside both is the error of u that they leave.
+Derivatives are restarts of the settled room with one parameter moved each, as the fit makes them; with two
+threads they run beside each other. Memory is the process': one grid a call for its own.
 """
 
 import json
@@ -16,13 +17,16 @@ import numpy as np
 import typer
 
 from app.room_scene import RigOptions, room_scene
+from app.score import score_solution
 from app.synthetic_problem import known_planes
 from app.truth import RoomVolume, read_volume
 from core.problem import Problem
+from core.result import Solution
 from core.room.grid import AXES
 from core.room.march import MarchSettings, march
+from core.room.model import Flow
 from core.room.prior import Prior, room_prior
-from core.room.room import Room, room
+from core.room.room import Room, carried_over, room
 from core.room.runs import Attempt, RoomSettings, attempt, first_profile_k, perturbed
 from core.solve.room import closure_name
 
@@ -49,18 +53,16 @@ def register(bench: typer.Typer) -> None:
 
 
 def cost_row(volume: RoomVolume, cells: int, *, jacobian: bool) -> dict[str, float | str]:
-    """One grid: compile and march times apart, the change that was left, the process' largest memory."""
+    """One grid: compile and march times apart, the error that was left, the process' largest memory."""
     problem = _problem(volume)
-    where = room(problem.scene, cells, closure_name(problem.scene))
-    prior = room_prior(problem, where.layout)
+    closure = closure_name(problem.scene)
     settings = RoomSettings()
-    model = where.model(prior.mean)
-    start = where.at_rest(model, first_profile_k(problem, where))
+    where = room(problem.scene, cells, closure)
+    prior = room_prior(problem, where.layout)
+    start = where.at_rest(where.model(prior.mean), first_profile_k(problem, where))
+    compile_s = _compiled(where, prior, start)
     began_s = time.process_time()
-    march(start, model, MarchSettings(longest_s=1.0, window_s=1.0, level_ahead_s=0.0))
-    compile_s = time.process_time() - began_s
-    began_s = time.process_time()
-    base = attempt(where, prior.mean, start, settings.settle_s, _VERTICES, lambda _: None)
+    base = attempt(where, prior.mean, start, settings.settle_s, _VERTICES, _quiet)
     run_s = time.process_time() - began_s
     row: dict[str, float | str] = {
         "cells": "x".join(str(where.grid.cells[a]) for a in AXES),
@@ -70,9 +72,45 @@ def cost_row(volume: RoomVolume, cells: int, *, jacobian: bool) -> dict[str, flo
         "steps": float(base.flow.steps),
         "left_change": base.flow.change,
         "outcome": base.flow.outcome.name,
-        "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "u_rel": _error(base, volume),
     }
+    row |= _from_coarse(problem, where, prior, settings, volume)
+    row["memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return row | (_derivatives(where, prior, base, settings, run_s) if jacobian else {})
+
+
+def _from_coarse(
+    problem: Problem, where: Room, prior: Prior, settings: RoomSettings, volume: RoomVolume
+) -> dict[str, float]:
+    """The same room from a coarse one that has settled: both marches' cost, and the error."""
+    coarse = room(problem.scene, settings.coarse_cells, where.closure)
+    start = coarse.at_rest(coarse.model(prior.mean), first_profile_k(problem, coarse))
+    _compiled(coarse, prior, start)
+    began_s = time.process_time()
+    settled = attempt(coarse, prior.mean, start, settings.settle_s, _VERTICES, _quiet)
+    flow = carried_over(settled.flow.last, coarse.grid, where.grid)
+    base = attempt(where, prior.mean, flow, settings.refine_s, _VERTICES, _quiet)
+    return {"from_coarse_cpu_s": time.process_time() - began_s, "from_coarse_u_rel": _error(base, volume)}
+
+
+def _compiled(where: Room, prior: Prior, start: Flow) -> float:
+    """Processor seconds of a march's first second."""
+    began_s = time.process_time()
+    settings = MarchSettings(longest_s=1.0, window_s=1.0, level_ahead_s=0.0)
+    march(start, where.model(prior.mean), settings)
+    return time.process_time() - began_s
+
+
+def _error(found: Attempt, volume: RoomVolume) -> float:
+    """u's error over its rms."""
+    seen, axes = found.seen, (volume.x_m, volume.y_m, volume.z_m)
+    x, y, z = (np.linspace(axis[0], axis[-1], n) for axis, n in zip(axes, _VERTICES, strict=True))
+    there = Solution(x, y, z, volume.ambient_k + seen.excess_k, seen.pressure_m2_s2, seen.velocity_m_s)
+    return float(score_solution(there, volume)["u"]["rel"])
+
+
+def _quiet(_: dict[str, float]) -> None:
+    """Tells nobody."""
 
 
 def _derivatives(
@@ -100,8 +138,9 @@ def _problem(volume: RoomVolume) -> Problem:
 def _sentence(row: dict[str, float | str]) -> str:
     text = (
         f"{row['cells']}: {row['run_cpu_s']:.1f} CPU s for {row['model_s']:.0f} s of air in {row['steps']:.0f} "
-        f"steps ({row['outcome']}, change {row['left_change']:.3f}); compiled in {row['compile_s']:.1f} s; "
-        f"{row['memory_mb']:.0f} MB"
+        f"steps ({row['outcome']}, change {row['left_change']:.3f}), u {row['u_rel']:.3f}; from a coarse room, "
+        f"its own march counted, {row['from_coarse_cpu_s']:.1f} CPU s, u {row['from_coarse_u_rel']:.3f}; "
+        f"compiled in {row['compile_s']:.1f} s; {row['memory_mb']:.0f} MB"
     )
     if "gain_of_second_thread" in row:
         text += (

@@ -37,6 +37,10 @@ def register(bench: typer.Typer) -> None:
         light: Annotated[Literal["texture", "projector"], typer.Option()] = "texture",
         rig: Annotated[Literal["paper", "lab"], typer.Option()] = "paper",
         wrong: Annotated[float, typer.Option(help="Multiplies the supply's excess and velocity.")] = 1.0,
+        wall_heat: Annotated[
+            float,
+            typer.Option(help="Multiplies the walls' heat coefficient as it follows from what is entered."),
+        ] = 1.0,
         closure: Annotated[
             Literal["auto", "given", "zero_equation"], typer.Option(help="given: constant viscosity.")
         ] = "auto",
@@ -46,14 +50,20 @@ def register(bench: typer.Typer) -> None:
         as_json: Annotated[bool, typer.Option("--json")] = False,
     ) -> None:
         """Errors of T, u and p, and the share of points within their 95 % intervals."""
-        settings = RoomSettings(cells=cells, use_images=images)
+        settings = RoomSettings(cells=cells, use_images=images, wall_heat=wall_heat)
         for path in truth:
             for seed in range(seeds):
                 problem, volume = problem_of(path, information, light, rig, seed)
                 problem = entered(problem, wrong, closure)
-                row = {"truth": path.stem, "information": information, "seed": seed} | fit_row(
-                    problem, volume, settings
-                )
+                row = {
+                    "truth": path.stem,
+                    "information": information,
+                    "light": light,
+                    "rig": rig,
+                    "seed": seed,
+                }
+                row |= {"wrong": wrong, "wall_heat": wall_heat, "closure": closure, "images": images}
+                row |= {"cells": cells} | fit_row(problem, volume, settings)
                 typer.echo(json.dumps(row) if as_json else _sentence(row))
 
 
@@ -87,8 +97,9 @@ def entered(problem: Problem, wrong: float, closure: str) -> Problem:
 
 def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dict[str, Any]:
     """Solve; errors, coverage, processor seconds, and what was said."""
+    told: list[dict[str, float]] = []
     began_s = time.process_time()
-    solution = solve_room(problem, settings)
+    solution = solve_room(problem, settings, on_event=told.append)
     cpu_s = time.process_time() - began_s
     scores = score_solution(solution, volume)
     return {
@@ -97,6 +108,7 @@ def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dic
         "T_departure": scores["T"]["departure_of_departures"],
         "p_departure": scores["p"]["rel_departure"],
         **coverage(solution, volume),
+        **{name: value for event in told for name, value in event.items() if name.startswith("supply_")},
         "cpu_s": cpu_s,
         "wall_s": solution.solver_s,
         "outcome": solution.outcome.name,

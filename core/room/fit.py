@@ -4,12 +4,13 @@
 
 q are parameters in units of their prior deviations. s is each datum's noise, r what the grid cannot
 represent, estimated from the residual of each kind of data; c counts neighbouring data that err together.
-The prior is Student's: a supply that was entered wrongly by many sigma is let go, and said.
+The prior is Student's: a supply that was entered wrongly by many sigma is let go, and said. The closure's
+viscosity, which nobody enters, keeps a Gaussian one: else it is let go in a wrong supply's place.
 """
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 CORRELATED = 4.0
 # Errors of grid and closure reach over whole jets: the posterior counts that many times fewer data again.
@@ -31,16 +32,19 @@ def gauss_newton(
     residual: Float[np.ndarray, " data"],
     variance: Float[np.ndarray, " data"],
     jacobian: Float[np.ndarray, "data active"],
+    firm: Bool[np.ndarray, " active"],
     *,
     trusting: bool = False,
 ) -> Posterior:
     """One step from `vector`, where the data minus the prediction is `residual`; each parameter's is cut.
 
-    `trusting` keeps the prior Gaussian: for first steps, when the model is still far from the data.
+    `firm` parameters keep a Gaussian prior; `trusting` keeps that of all: for first steps, when the model is
+    still far from the data.
     """
     new, normal, prior = vector, np.eye(len(vector)), np.ones(len(vector))
     for _ in range(6):
-        prior = np.ones_like(new) if trusting else (_STUDENT_NU + 1.0) / (_STUDENT_NU + new**2)
+        student = (_STUDENT_NU + 1.0) / (_STUDENT_NU + new**2)
+        prior = np.where(firm | trusting, 1.0, student)
         normal = (jacobian.T / variance) @ jacobian + np.diag(prior)
         gradient = (jacobian.T / variance) @ residual - prior * vector
         step = np.linalg.solve(normal, gradient)

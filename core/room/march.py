@@ -27,12 +27,14 @@ from core.setting import SettingError, setting
 class MarchSettings:
     """How long and how finely to march.
 
-    `level_ahead_s`: how far each window's heat balance is carried ahead (0 leaves the level of the
-    temperature to time); it begins after `settle_s` and ends with the first two thirds. No window begins
-    after `most_steps`.
+    `least_s`: before it no march counts as settled: air that has just been asked for another supply hardly
+    differs between windows. `level_ahead_s`: how far each window's heat balance is carried ahead (0 leaves
+    the level of the temperature to time); it begins after `settle_s` and ends with the first two thirds. No
+    window begins after `most_steps`.
     """
 
     longest_s: float = 60.0
+    least_s: float = 0.0
     window_s: float = 5.0
     tolerance: float = 0.02
     courant: float = 0.45
@@ -75,7 +77,7 @@ def march(
     """The steady flow that `flow` settles to."""
     windows: list[Flow] = []
     seconds = settings.window_s
-    courant, model_s, steps, change = settings.courant, 0.0, 0, float("inf")
+    courant, model_s, steps, marched, change = settings.courant, 0.0, 0, 0, float("inf")
     outcome = Outcome.step_limit
     while model_s < settings.longest_s - 1e-6 and steps < settings.most_steps:
         start = flow
@@ -88,19 +90,25 @@ def march(
             continue
         model_s, steps = model_s + seconds, steps + taken
         change = float(_relative_change(mean, windows[-1])) if windows else float("inf")
-        windows.append(mean)
+        marched += 1
+        # No more than the last third is asked for, whenever the march ends.
+        windows = [*windows, mean][-_third(marched) :]
         if on_window is not None:
             # The middle of the room as it is now, for somebody to watch it grow.
             plane = np.asarray(mean.excess_k[:, mean.excess_k.shape[1] // 2], np.float32)
             on_window({"model_s": model_s, "change": change, "excess_plane_k": plane})
         flow = new
-        if change < settings.tolerance:
+        if change < settings.tolerance and model_s > settings.least_s - 1e-6:
             outcome = Outcome.converged
             break
         if settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
             flow = _levelled(new, (new.excess_k - start.excess_k) / seconds, model, settings.level_ahead_s)
-    mean = _mean(windows[-max(1, round(len(windows) / 3)) :]) if windows else flow
+    mean = _mean(windows) if windows else flow
     return March(flow, mean, outcome, model_s, steps, change)
+
+
+def _third(windows: int) -> int:
+    return max(1, round(windows / 3))
 
 
 def _window(flow: Flow, model: RoomModel, settings: MarchSettings, courant: float) -> tuple[Flow, Flow, int]:

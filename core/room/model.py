@@ -18,7 +18,7 @@ from core.room.grid import AXES, Cells, RoomGrid, Velocity, cut, face_mean
 from core.room.k_epsilon import KEpsilonState
 from core.room.momentum import Viscosity, momentum_rate
 from core.room.pressure import PressureSolver, pressure_solver, project
-from core.room.transport import scalar_rate, wall_heat_rate
+from core.room.transport import add_to_walls, scalar_rate, wall_heat_rate
 
 
 class Flow(eqx.Module):
@@ -117,7 +117,7 @@ def longest_step_s(flow: Flow, model: RoomModel, courant: float) -> Float[Array,
         jnp.maximum(jnp.abs(cut(flow.velocity[a], 0, -1, a)), jnp.abs(cut(flow.velocity[a], 1, 0, a)))
         / grid.spacing_m[a]
         for a in AXES
-    )
+    ) + _sliding_rate(model)
     viscosity = model.viscosity(flow)
     diffusive = jnp.maximum(viscosity.cells_m2_s, model.diffusivity_m2_s(viscosity))
     curvature = sum(1.0 / h**2 for h in grid.spacing_m)
@@ -127,6 +127,20 @@ def longest_step_s(flow: Flow, model: RoomModel, courant: float) -> Float[Array,
 def cell_velocity_m_s(velocity: Velocity) -> Float[Array, "nx ny nz 3"]:
     """Velocity in the cells' centres."""
     return jnp.stack([face_mean(velocity[a], a) for a in AXES], -1)
+
+
+def _sliding_rate(model: RoomModel) -> Cells:
+    """Courant rate [1/s] beside walls that slide: a lid drives air that is still at rest."""
+    grid = model.grid
+    rate = jnp.zeros(grid.cells, jnp.float32)
+    for a in AXES:
+        first_m, second_m = (grid.spacing_m[b] for b in AXES if b != a)
+        below, above = (
+            jnp.abs(wall.tangent_m_s[0]) / first_m + jnp.abs(wall.tangent_m_s[1]) / second_m
+            for wall in model.boundary.walls[a]
+        )
+        rate = add_to_walls(rate, below, above, a)
+    return rate
 
 
 def _advance_inner(

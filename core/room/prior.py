@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from core.problem import Problem
 from core.room.grid import WALLS
@@ -80,9 +80,15 @@ class Prior(eqx.Module):
             named += [f"{stem}[{n}]" if np.ndim(leaf) else stem for n in range(np.size(leaf))]
         return [named[n] for n in self.active()]
 
+    def firm(self) -> Bool[np.ndarray, " active"]:
+        """Which fitted parameters describe the closure: nobody entered them, so nobody did so wrongly."""
+        return np.array([name.startswith(("log_closure", "log_viscosity")) for name in self.names()], bool)
 
-def room_prior(problem: Problem, layout: RoomLayout, *, log_viscosity_std: float = 0.0) -> Prior:
-    """Parameters as stated, and their spread."""
+
+def room_prior(
+    problem: Problem, layout: RoomLayout, *, log_viscosity_std: float = 0.0, wall_heat: float = 1.0
+) -> Prior:
+    """Parameters as stated, and their spread; `wall_heat` multiplies every wall's heat coefficient."""
     scene = problem.scene
     ambient = scene.air.ambient_temperature_k
     inlets = [b for b in scene.boundary if isinstance(b, Inlet)]
@@ -102,7 +108,7 @@ def room_prior(problem: Problem, layout: RoomLayout, *, log_viscosity_std: float
     mean = RoomParameters(
         _f32(excess),
         jnp.zeros(len(inlets)),
-        jnp.float32(0.0),
+        jnp.float32(np.log(wall_heat)),
         _f32(wall_excess),
         jnp.full(6, np.log(heat_m_s)),
         _f32([h.temperature_k - ambient for h in heaters]),

@@ -17,16 +17,20 @@ from core.room.prior import Prior, outflow_excess_k
 from core.room.room import Room, room, seen
 from core.room.setup import RoomParameters
 from core.scene import Inlet
-from core.setting import setting
+from core.setting import check_range, setting
 
 Event = Callable[[dict[str, float]], object]
 
-# Steps of the finite differences, in prior deviations: beyond the march's own wobble, short of curvature.
-DIFFERENCE = 0.5
+# Steps of the finite differences, in prior deviations: beyond the march's own wobble, short of curvature. At
+# half a deviation the wobble outweighs what 1 % of a supply does, and the fit of a wrong supply does not end.
+DIFFERENCE = 2.0
 
 # Steps a cell of the room's edge and second of the reference room, which takes half as many: a room whose
 # air turns out far faster than what was stated about it must not take hours.
 _STEPS = 1.5
+
+# A jet of the reference room answers another supply within so long.
+_RESPONSE_S = 30.0
 
 
 @setting
@@ -36,13 +40,13 @@ class RoomSettings:
     The coarse room is corrected while a parameter moves by more than `coarse_step` prior deviations and
     the misfit falls below `worthwhile` of what it was: a coarse grid's own error must not move the rest.
     A Jacobian serves for `straight` prior deviations. The fine room's last march, the longest, follows a step below
-    `fine_step`.
+    `fine_step`. `wall_heat` multiplies what the balance, or the usual guess, gives for the walls' heat coefficient.
     """
 
     cells: int = 48
     coarse_cells: int = 32
     vertices: int = 64
-    rounds: int = 4
+    rounds: int = 8
     coarse_rounds: int = 6
     coarse_step: float = 1.0
     worthwhile: float = 0.85
@@ -54,7 +58,11 @@ class RoomSettings:
     final_s: float = 150.0
     use_images: bool = True
     log_viscosity_std: float = 0.0
+    wall_heat: float = 1.0
     threads: int = 2
+
+    def __post_init__(self) -> None:
+        check_range("wall_heat", self.wall_heat, 0.01, 100.0, "", "1 takes what the heat balance gives.")
 
 
 class Attempt(eqx.Module):
@@ -109,6 +117,7 @@ def attempt(
     pace = where.pace
     timing = MarchSettings(
         longest_s=seconds * pace,
+        least_s=min(seconds, _RESPONSE_S) * pace,
         window_s=min(5.0, seconds) * pace,
         settle_s=0.15 * seconds * pace,
         level_ahead_s=20.0 * pace,

@@ -10,7 +10,7 @@ import time
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from core.problem import Problem
 from core.result import Solution
@@ -70,7 +70,9 @@ def begin(problem: Problem, settings: RoomSettings, tell: Event) -> Begun:
     closure = closure_name(problem.scene)
     coarse, fine = (room(problem.scene, n, closure) for n in (settings.coarse_cells, settings.cells))
     vertices = (settings.vertices, settings.vertices, settings.vertices)
-    prior = room_prior(problem, coarse.layout, log_viscosity_std=settings.log_viscosity_std)
+    prior = room_prior(
+        problem, coarse.layout, log_viscosity_std=settings.log_viscosity_std, wall_heat=settings.wall_heat
+    )
     base = settled(coarse, prior, problem, settings, vertices, tell)
     flow = carried_over(base.flow.last, coarse.grid, fine.grid)
     first = attempt(fine, prior.mean, flow, settings.refine_s, vertices, tell)
@@ -96,6 +98,7 @@ def finish(
     if np.any(vector) or not settings.use_images:
         first = attempt(fine, prior.parameters(vector), first.flow.last, seconds, vertices, tell)
     posterior, best = fine_fit(fine, prior, data, vector, first, jacobian, settings, tell)
+    tell(supplied(fine, best))
     solved = Solved(problem, data, prior, posterior, jacobian, other, first.seen, best, fine.layout)
     return solution(solved, time.perf_counter() - start_s, use_images=settings.use_images)
 
@@ -113,7 +116,9 @@ def coarse_fit(
     finer = data.predicted(begun.first.seen) - data.predicted(base.seen)
     for n in range(settings.coarse_rounds if settings.use_images else 0):
         # Where the parameters have moved, half of what was taken off may be wrong.
-        new = corrected(vector, base, data, jacobian, 0.5 * finer, offset=finer, trusting=True).vector
+        new = corrected(
+            vector, base, data, jacobian, 0.5 * finer, firm=prior.firm(), offset=finer, trusting=True
+        ).vector
         if float(np.abs(new - vector).max(initial=0.0)) < settings.coarse_step:
             break
         where, seconds = prior.parameters(new), settings.restart_s
@@ -145,7 +150,7 @@ def fine_fit(
     posterior = at_least = Posterior(vector, np.eye(len(vector)), np.zeros(0))
     grid_difference = data.predicted(first.seen) - data.predicted(jacobian[0])
     for n in range(settings.rounds if settings.use_images else 0):
-        new = corrected(posterior.vector, best, data, jacobian, grid_difference)
+        new = corrected(posterior.vector, best, data, jacobian, grid_difference, firm=prior.firm())
         step = float(np.abs(new.vector - posterior.vector).max(initial=0.0))
         last = n == settings.rounds - 1 or step < settings.fine_step
         seconds = settings.final_s if last else settings.refine_s
@@ -172,6 +177,18 @@ def fine_fit(
     return posterior, best
 
 
+def supplied(fine: Room, best: Attempt) -> dict[str, float]:
+    """Excess temperature and speed of every supply in the room that was found."""
+    found: dict[str, float] = {}
+    for n, velocity in enumerate(fine.layout.inlet_velocity_m_s):
+        speed = float(np.linalg.norm(velocity)) * float(np.exp(best.parameters.inlet_log_flow[n]))
+        found |= {
+            f"supply_{n + 1}_excess_k": float(best.parameters.inlet_excess_k[n]),
+            f"supply_{n + 1}_m_s": speed,
+        }
+    return found
+
+
 def closure_name(scene: Scene) -> str:
     """The closure that a scene asks for; `auto` and `learned` start from k-epsilon."""
     named = {"molecular": "molecular", "given": "constant", "zero_equation": "zero_equation"}
@@ -185,6 +202,7 @@ def corrected(
     runs: list[Prediction],
     grid_difference: Float[np.ndarray, " data"],
     *,
+    firm: Bool[np.ndarray, " active"],
     offset: Float[np.ndarray, " data"] | float = 0.0,
     trusting: bool = False,
 ) -> Posterior:
@@ -194,7 +212,7 @@ def corrected(
     jacobian = np.stack([(data.predicted(run) - start) / DIFFERENCE for run in runs[1:]], axis=1)
     residual = values - data.predicted(best.seen) - offset
     weights = weighted_variance(variance, group, residual, grid_difference)
-    return gauss_newton(vector, residual, weights, jacobian, trusting=trusting)
+    return gauss_newton(vector, residual, weights, jacobian, firm, trusting=trusting)
 
 
 def misfit_ratio(

@@ -21,7 +21,7 @@ SUPPLY = Inlet(
     velocity_m_s=(0.4, 0.0, 0.0),
 )
 SETTINGS = RoomSettings(
-    cells=10, coarse_cells=8, vertices=12, settle_s=30.0, restart_s=15.0, refine_s=10.0, final_s=15.0
+    cells=10, coarse_cells=8, vertices=12, settle_s=90.0, restart_s=30.0, refine_s=30.0, final_s=30.0
 )
 
 
@@ -83,10 +83,9 @@ def test_images_repair_a_supply_that_was_entered_wrongly(truth: Solution):
 
     flow, warmest_k = supplied(found)
     true_flow, true_warmest_k = supplied(truth)
-    # Entered 2 K too warm; marches this short leave a few tenths.
-    assert warmest_k == pytest.approx(true_warmest_k, abs=0.6)
-    # Entered 20 % too fast: ten cells hardly tell flow from viscosity, but do not make it worse.
-    assert 0.9 * true_flow < flow < 1.2 * true_flow
+    # Entered 2 K too warm and 20 % too fast; marches this short leave a tenth of a kelvin and a few per cent.
+    assert warmest_k == pytest.approx(true_warmest_k, abs=0.2)
+    assert flow == pytest.approx(true_flow, rel=0.05)
     # The operator is told.
     assert any("than the 305.15 K entered" in note for note in found.notes)
     assert found.temperature_std_k.min() > 0
