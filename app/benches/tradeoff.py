@@ -169,7 +169,7 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
 
     figure = Figure(figsize=(11, 4.2), layout="constrained")
     axes = figure.subplots(1, 2, sharey=False)
-    colours = {"draft": "tab:blue", "grid": "tab:green", "room": "tab:orange"}
+    colours = {"draft": "tab:blue", "grid": "tab:green", "room": "tab:orange", "mlp": "tab:red"}
     for axis, quantity, label in ((axes[0], "T_share", "T error over departures"), (axes[1], "u", "u error")):
         for row in rows:
             if row[quantity] is not None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from app.benches.calibrate import Cost, line_through
+from app.benches.tradeoff import POINTS, draw
 from app.errors import BadInputError
 from app.machine import Machine, keep_machine, read_machine, this_machine
 from app.presets import PRESETS
@@ -96,14 +97,18 @@ def test_off_the_front_is_judged_among_alike():
 def test_the_committed_front_is_wide_and_the_presets_lie_on_it():
     kept = rows()
     assert span(kept, "T_share") >= 100
-    surveyed = [row for row in kept if row["information"] == "surveyed"]
-    # Without the walls `standard` is there for the velocity: its T is then worse than `draft`'s (README).
-    for preset, sweep, quantity in (
-        ("draft", kept, "T_share"), ("standard", surveyed, "T_share"), ("standard", kept, "u")
+    for preset, quantity in (
+        ("draft", "T_share"), ("grid", "T_share"), ("grid", "u"), ("standard", "T_share"), ("standard", "u")
     ):  # fmt: skip
-        distance = off_front(sweep, preset, quantity)
+        distance = off_front(kept, preset, quantity)
         assert distance is not None
         assert distance <= 1.2
+
+
+def test_the_plot_shows_every_row_of_a_whole_sweep(tmp_path):
+    assert {row["method"] for row in rows()} == {point.method for point in POINTS}
+    draw(rows(), tmp_path / "front.png")
+    assert (tmp_path / "front.png").stat().st_size > 10_000
 
 
 def test_more_steps_cost_more_operations_and_come_nearer():
