@@ -27,6 +27,8 @@ from core.solve.room import closure_name
 
 # Iterations of `draft` without a plane over those with one: 55 over 35, median of six rooms.
 _FREE_PROFILE = 1.5
+# Corrections of a fine room whose walls are stated, before a step is too small to matter.
+_STATED_ROUNDS = 3
 
 # As `airlens simulate --information` names them; `images`: not even a plane.
 Level = Literal["surveyed", "operator", "paper", "images"]
@@ -72,11 +74,14 @@ def room_work(problem: Problem, flow: ExpectedFlow, settings: RoomSettings) -> W
     scene = problem.scene
     coarse = room(scene, settings.coarse_cells, closure_name(scene))
     fine = room(scene, settings.cells, closure_name(scene))
-    parameters = len(room_prior(problem, coarse.layout).active())
-    restarts = (1 + parameters) * settings.restart_s
+    prior = room_prior(problem, coarse.layout)
+    restarts = (1 + len(prior.active())) * settings.restart_s
+    # Walls that nobody has stated move far: derivatives are made again, and corrections go on to the last.
+    far = bool(np.any(np.asarray(prior.std.wall_excess_k) > 0))
+    rounds = settings.rounds if far else min(settings.rounds, _STATED_ROUNDS)
     # One coarse correction that is tried, and the second closure's run, beside the Jacobian's.
-    coarse_s = settings.settle_s + restarts + 2 * settings.restart_s
-    fine_s = settings.refine_s + max(settings.rounds - 1, 0) * settings.refine_s + settings.final_s
+    coarse_s = settings.settle_s + (1 + far) * restarts + 2 * settings.restart_s
+    fine_s = settings.refine_s + max(rounds - 1, 0) * settings.refine_s + settings.final_s
     steps = flow.pace / flow.step_s * flow.cell_m
     loops = 0.0
     for place, seconds in ((coarse, coarse_s), (fine, fine_s)):
