@@ -149,21 +149,23 @@ def fine_fit(
     best = least = first
     posterior = at_least = Posterior(vector, np.eye(len(vector)), np.zeros(0))
     grid_difference = data.predicted(first.seen) - data.predicted(jacobian[0])
+
+    def marched(towards: Posterior, seconds: float, name: float) -> tuple[Attempt, float]:
+        tried = attempt(fine, prior.parameters(towards.vector), best.flow.last, seconds, data.vertices, tell)
+        left = misfit_ratio(data, tried, least)
+        tell({"round": name, "misfit_left": left, **fitted(prior, towards.vector)})
+        return tried, left
+
     for n in range(settings.rounds if settings.use_images else 0):
         new = corrected(posterior.vector, best, data, jacobian, grid_difference, firm=prior.firm())
         step = float(np.abs(new.vector - posterior.vector).max(initial=0.0))
         last = n == settings.rounds - 1 or step < settings.fine_step
         seconds = settings.final_s if last else settings.refine_s
-        tried = attempt(fine, prior.parameters(new.vector), best.flow.last, seconds, data.vertices, tell)
-        left = misfit_ratio(data, tried, least)
-        tell({"round": n + 1.0, "misfit_left": left, **fitted(prior, new.vector)})
+        tried, left = marched(new, seconds, n + 1.0)
         if left > _HARM:
             # Half of a step that did harm: the derivatives are a coarser room's.
-            middle = 0.5 * (posterior.vector + new.vector)
-            new = Posterior(middle, new.covariance, new.deviation)
-            tried = attempt(fine, prior.parameters(middle), best.flow.last, seconds, data.vertices, tell)
-            left = misfit_ratio(data, tried, least)
-            tell({"round": n + 1.5, "misfit_left": left, **fitted(prior, middle)})
+            new = Posterior(0.5 * (posterior.vector + new.vector), new.covariance, new.deviation)
+            tried, left = marched(new, seconds, n + 1.5)
         if left > _HARM:
             posterior = Posterior(posterior.vector, new.covariance, new.deviation)
             break
