@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.room.grid import AXES, RoomGrid, Velocity, first_plane, last_plane
+from core.room.grid import AXES, RoomGrid, Velocity, first_plane, last_plane, stored
 
 Plane = Float[Array, "first second"]
 
@@ -78,7 +78,7 @@ def inflow_ghosts(
     below = jnp.where(low[0] > 0, low[1], first_plane(field, axis))
     above = jnp.where(high[0] < 0, high[1], last_plane(field, axis))
     below, above = jnp.expand_dims(below, axis), jnp.expand_dims(above, axis)
-    return jnp.concatenate([below, below, field, above, above], axis)
+    return stored(jnp.concatenate([below, below, field, above, above], axis))
 
 
 def _index(axis: int, plane: int) -> tuple[slice | int, ...]:

@@ -88,11 +88,17 @@ def difference(field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
     return cut(field, 1, 0, axis) - cut(field, 0, -1, axis)
 
 
+def stored(field: Float[Array, "..."]) -> Float[Array, "..."]:
+    """`field` kept as it is, joined: XLA would join it anew in every loop that reads it, cell by cell."""
+    return lax.optimization_barrier(field)
+
+
 def with_walls(
     low: Float[Array, "..."], inner: Float[Array, "..."], high: Float[Array, "..."], axis: int
 ) -> Float[Array, "..."]:
     """`inner` between two wall planes, given without the axis."""
-    return jnp.concatenate([jnp.expand_dims(low, axis), inner, jnp.expand_dims(high, axis)], axis)
+    planes = jnp.expand_dims(low, axis), jnp.expand_dims(high, axis)
+    return stored(jnp.concatenate([planes[0], stored(inner), planes[1]], axis))
 
 
 def first_plane(field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:

@@ -15,6 +15,7 @@ from core.room.grid import (
     face_mean,
     first_plane,
     last_plane,
+    stored,
     with_walls,
 )
 from core.room.transport import limited_flux
@@ -38,19 +39,19 @@ def momentum_rate(
 ) -> tuple[Field, Field, Field]:
     """du/dt of the inner faces of each component, pressure left out."""
     shear = {
-        (a, b): _inner_shear(velocity, viscosity.cells_m2_s, a, b, grid) for a, b in ((0, 1), (0, 2), (1, 2))
+        (a, b): stored(_inner_shear(velocity, viscosity.cells_m2_s, a, b, grid))
+        for a, b in ((0, 1), (0, 2), (1, 2))
     }
     rates = []
     for a in AXES:
         normal = 2.0 * viscosity.cells_m2_s * difference(velocity[a], a) / grid.spacing_m[a]
-        rate = difference(normal - _own_flux(velocity[a], a), a) / grid.spacing_m[a]
+        rate = difference(stored(normal - _own_flux(velocity[a], a)), a) / grid.spacing_m[a]
         for b in AXES:
             if b != a:
-                stress = _walled_shear(
-                    shear[min(a, b), max(a, b)], velocity, viscosity, boundary, (a, b), grid
-                )
-                flux = _cross_flux(velocity, boundary, a, b)
-                rate = rate + difference(stress - flux, b) / grid.spacing_m[b]
+                inner = shear[min(a, b), max(a, b)]
+                stress = _walled_shear(inner, velocity, viscosity, boundary, (a, b), grid)
+                flux = stored(stress - _cross_flux(velocity, boundary, a, b))
+                rate = rate + difference(flux, b) / grid.spacing_m[b]
         rates.append(_with_inlets(rate, boundary.walls[a], a))
     rates[2] = rates[2] + face_mean(buoyancy_m_s2, 2)
     u, v, w = rates
@@ -60,7 +61,7 @@ def momentum_rate(
 def _own_flux(component: Field, axis: int) -> Field:
     """u_a u_a in the cells."""
     edge = [(1, 1) if a == axis else (0, 0) for a in AXES]
-    return limited_flux(jnp.pad(component, edge, mode="edge"), face_mean(component, axis), axis)
+    return limited_flux(stored(jnp.pad(component, edge, mode="edge")), face_mean(component, axis), axis)
 
 
 def _cross_flux(velocity: Velocity, boundary: Boundary, a: int, b: int) -> Field:
@@ -71,7 +72,7 @@ def _cross_flux(velocity: Velocity, boundary: Boundary, a: int, b: int) -> Field
     below = _ghost(low, first_plane(inner, b), a, b, inward=1.0)
     above = _ghost(high, last_plane(inner, b), a, b, inward=-1.0)
     below, above = jnp.expand_dims(below, b), jnp.expand_dims(above, b)
-    return limited_flux(jnp.concatenate([below, below, inner, above, above], b), carrier, b)
+    return limited_flux(stored(jnp.concatenate([below, below, inner, above, above], b)), carrier, b)
 
 
 def _ghost(wall: WallPlane, cell: Field, a: int, b: int, *, inward: float) -> Field:
