@@ -14,7 +14,17 @@ from jaxtyping import Array, Float
 
 from core.room.boundary import Boundary, set_normal
 from core.room.closure import AbstractClosure
-from core.room.grid import AXES, Cells, RoomGrid, Velocity, cut, face_mean
+from core.room.grid import (
+    AXES,
+    Cells,
+    RoomGrid,
+    Velocity,
+    cut,
+    face_mean,
+    first_plane,
+    last_plane,
+    with_walls,
+)
 from core.room.k_epsilon import KEpsilonState
 from core.room.momentum import Viscosity, momentum_rate
 from core.room.pressure import PressureSolver, pressure_solver, project
@@ -146,5 +156,5 @@ def _sliding_rate(model: RoomModel) -> Cells:
 def _advance_inner(
     component: Float[Array, "..."], change: Float[Array, "..."], axis: int
 ) -> Float[Array, "..."]:
-    edge = [(1, 1) if a == axis else (0, 0) for a in AXES]
-    return component + jnp.pad(change, edge)
+    inner = cut(component, 1, -1, axis) + change
+    return with_walls(first_plane(component, axis), inner, last_plane(component, axis), axis)

@@ -12,7 +12,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from core.room.grid import AXES, Cells, RoomGrid, Velocity, cut, difference
+from core.room.grid import (
+    AXES,
+    Cells,
+    RoomGrid,
+    Velocity,
+    cut,
+    difference,
+    first_plane,
+    last_plane,
+    with_walls,
+)
 
 
 class PressureSolver(eqx.Module):
@@ -59,14 +69,7 @@ def project(
 
 def _correct(component: Float[Array, "..."], step: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
     inner = cut(component, 1, -1, axis) - step
-    return jnp.concatenate(
-        [
-            cut(component, 0, 1 - component.shape[axis], axis),
-            inner,
-            cut(component, component.shape[axis] - 1, 0, axis),
-        ],
-        axis,
-    )
+    return with_walls(first_plane(component, axis), inner, last_plane(component, axis), axis)
 
 
 def _along(
