@@ -57,7 +57,8 @@ def advance(
     """k and epsilon after `dt_s`."""
     k, epsilon = state.energy_m2_s2, state.dissipation_m2_s3
     eddy = scale * state.eddy_m2_s()
-    production = eddy * strain_squared(velocity, grid)
+    # The division last: XLA keeps its result for both equations, and would work a product out twice.
+    production = scale * C_MU * k**2 * strain_squared(velocity, grid) / epsilon
     touched, wall_production, wall_epsilon = wall_sources(k, velocity, boundary, grid, molecular_m2_s)
     production = jnp.where(touched > 0, wall_production, production)
     inflow_k = tuple(

@@ -10,6 +10,7 @@ transform below n = 128, and every derivative of it is again a matrix product.
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jax import lax
 from jaxtyping import Array, Float
 
 from core.room.grid import (
@@ -34,8 +35,8 @@ class PressureSolver(eqx.Module):
     def solve(self, source: Cells) -> Cells:
         """p with lap p = source, zero mean; the mean of `source` is dropped."""
         bx, by, bz = self.bases
-        spectrum = _along(source, bx, by, bz) * self.inverse
-        return _along(spectrum, bx.T, by.T, bz.T)
+        spectrum = _along(source, bz, by, bx) * self.inverse
+        return _along(spectrum, bz.T, by.T, bx.T)
 
 
 def pressure_solver(grid: RoomGrid) -> PressureSolver:
@@ -74,14 +75,16 @@ def _correct(component: Float[Array, "..."], step: Float[Array, "..."], axis: in
 
 def _along(
     field: Cells,
-    bx: Float[Array, "nx nx"],
-    by: Float[Array, "ny ny"],
     bz: Float[Array, "nz nz"],
+    by: Float[Array, "ny ny"],
+    bx: Float[Array, "nx nx"],
 ) -> Cells:
-    nx, ny, nz = field.shape
-    field = (bx @ field.reshape(nx, ny * nz)).reshape(nx, ny, nz)
-    field = jnp.matmul(by, field)
-    return (field.reshape(nx * ny, nz) @ bz.T).reshape(nx, ny, nz)
+    """Each basis takes the last axis and puts it first: three plain matrix products, and none transposes."""
+    shape = field.shape
+    for basis in (bz, by, bx):
+        rows = field.reshape(-1, basis.shape[1])
+        field = lax.dot_general(basis, rows, (((1,), (1,)), ((), ())))
+    return field.reshape(shape)
 
 
 def _axis(n: int, spacing_m: float) -> tuple[Float[np.ndarray, "n n"], Float[np.ndarray, " n"]]:
