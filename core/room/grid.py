@@ -101,6 +101,21 @@ def with_walls(
     return stored(jnp.concatenate([planes[0], stored(inner), planes[1]], axis))
 
 
+def closed(field: Cells) -> Float[Array, "nx2 ny2 nz2"]:
+    """A diffusivity with one ghost cell beyond every wall that makes its mean on the wall zero."""
+    for a in AXES:
+        low, high = cut(field, 0, 1 - field.shape[a], a), cut(field, field.shape[a] - 1, 0, a)
+        field = stored(jnp.concatenate([-low, field, -high], a))
+    return field
+
+
+def within(field: Float[Array, "..."], ghosts: tuple[int, ...]) -> Float[Array, "..."]:
+    """`field` without its outermost cells along these axes."""
+    for a in ghosts:
+        field = cut(field, 1, -1, a)
+    return field
+
+
 def first_plane(field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
     """The plane next to the lower wall."""
     return lax.index_in_dim(field, 0, axis, keepdims=False)

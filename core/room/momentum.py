@@ -10,15 +10,16 @@ from core.room.grid import (
     Cells,
     RoomGrid,
     Velocity,
+    closed,
     cut,
     difference,
     face_mean,
     first_plane,
     last_plane,
     stored,
-    with_walls,
+    within,
 )
-from core.room.transport import limited_flux
+from core.room.transport import add_to_walls, limited_flux
 
 Field = Float[Array, "..."]
 
@@ -38,20 +39,17 @@ def momentum_rate(
     grid: RoomGrid,
 ) -> tuple[Field, Field, Field]:
     """du/dt of the inner faces of each component, pressure left out."""
-    shear = {
-        (a, b): stored(_inner_shear(velocity, viscosity.cells_m2_s, a, b, grid))
-        for a, b in ((0, 1), (0, 2), (1, 2))
-    }
+    inside = closed(viscosity.cells_m2_s)
     rates = []
     for a in AXES:
         normal = 2.0 * viscosity.cells_m2_s * difference(velocity[a], a) / grid.spacing_m[a]
-        rate = difference(stored(normal - _own_flux(velocity[a], a)), a) / grid.spacing_m[a]
+        rate = difference(normal - _own_flux(velocity[a], a), a) / grid.spacing_m[a]
         for b in AXES:
             if b != a:
-                inner = shear[min(a, b), max(a, b)]
-                stress = _walled_shear(inner, velocity, viscosity, boundary, (a, b), grid)
-                flux = stored(stress - _cross_flux(velocity, boundary, a, b))
-                rate = rate + difference(flux, b) / grid.spacing_m[b]
+                rate = rate + _across(velocity, inside, boundary, (a, b), grid)
+        for b in AXES:
+            if b != a:
+                rate = add_to_walls(rate, *_friction(velocity[a], viscosity, boundary, (a, b), grid), b)
         rates.append(_with_inlets(rate, boundary.walls[a], a))
     rates[2] = rates[2] + face_mean(buoyancy_m_s2, 2)
     u, v, w = rates
@@ -64,15 +62,33 @@ def _own_flux(component: Field, axis: int) -> Field:
     return limited_flux(stored(jnp.pad(component, edge, mode="edge")), face_mean(component, axis), axis)
 
 
-def _cross_flux(velocity: Velocity, boundary: Boundary, a: int, b: int) -> Field:
-    """u_b u_a on the edges between the inner a-faces, walls of b included."""
-    inner = cut(velocity[a], 1, -1, a)
-    carrier = face_mean(velocity[b], a)
+def _across(
+    velocity: Velocity,
+    viscosity: Float[Array, "nx2 ny2 nz2"],
+    boundary: Boundary,
+    axes: tuple[int, int],
+    grid: RoomGrid,
+) -> Field:
+    """d/db (nu (du_a/db + du_b/da) - u_b u_a) at the inner a-faces, the walls' friction left out."""
+    a, b = axes
+    padded = _padded(velocity[a], boundary, a, b)
+    flux = limited_flux(padded, face_mean(velocity[b], a), b)
+    strain = (
+        difference(cut(padded, 1, -1, b), b) / grid.spacing_m[b]
+        + difference(velocity[b], a) / grid.spacing_m[a]
+    )
+    nu = face_mean(face_mean(within(viscosity, tuple(c for c in AXES if c != b)), a), b)
+    return difference(nu * strain - flux, b) / grid.spacing_m[b]
+
+
+def _padded(component: Field, boundary: Boundary, a: int, b: int) -> Field:
+    """u_a at its inner faces with two ghosts beyond each wall of b."""
+    inner = cut(component, 1, -1, a)
     low, high = boundary.walls[b]
     below = _ghost(low, first_plane(inner, b), a, b, inward=1.0)
     above = _ghost(high, last_plane(inner, b), a, b, inward=-1.0)
     below, above = jnp.expand_dims(below, b), jnp.expand_dims(above, b)
-    return limited_flux(stored(jnp.concatenate([below, below, inner, above, above], b)), carrier, b)
+    return stored(jnp.concatenate([below, below, inner, above, above], b))
 
 
 def _ghost(wall: WallPlane, cell: Field, a: int, b: int, *, inward: float) -> Field:
@@ -83,33 +99,18 @@ def _ghost(wall: WallPlane, cell: Field, a: int, b: int, *, inward: float) -> Fi
     return jnp.where(inflow, tangent, mirrored)
 
 
-def _inner_shear(velocity: Velocity, viscosity: Cells, a: int, b: int, grid: RoomGrid) -> Field:
-    """nu (du_a/db + du_b/da) on the inner edges of the plane a, b."""
-    gradient = (
-        difference(cut(velocity[a], 1, -1, a), b) / grid.spacing_m[b]
-        + difference(cut(velocity[b], 1, -1, b), a) / grid.spacing_m[a]
-    )
-    return face_mean(face_mean(viscosity, a), b) * gradient
-
-
-def _walled_shear(
-    inner: Field,
-    velocity: Velocity,
-    viscosity: Viscosity,
-    boundary: Boundary,
-    axes: tuple[int, int],
-    grid: RoomGrid,
-) -> Field:
-    """Shear on component a between the walls of b: `inner` closed by the two walls' friction."""
+def _friction(
+    component: Field, viscosity: Viscosity, boundary: Boundary, axes: tuple[int, int], grid: RoomGrid
+) -> tuple[Field, Field]:
+    """du_a/dt of the faces beside the two walls of b, by the walls' friction."""
     a, b = axes
-    component = cut(velocity[a], 1, -1, a)
-    planes = []
+    inner = cut(component, 1, -1, a)
+    beside = []
     for side, (wall, nearest) in enumerate(zip(boundary.walls[b], (first_plane, last_plane), strict=True)):
-        slip = nearest(component, b) - _on_faces(_tangent(wall, a, b), a, b)
+        slip = nearest(inner, b) - _on_faces(_tangent(wall, a, b), a, b)
         nu = _on_faces(viscosity.walls_m2_s[b][side], a, b)
-        stress = wall.grip * nu * slip / (0.5 * grid.spacing_m[b])
-        planes.append(stress if side == 0 else -stress)
-    return with_walls(planes[0], inner, planes[1], b)
+        beside.append(-wall.grip * nu * slip / (0.5 * grid.spacing_m[b] ** 2))
+    return beside[0], beside[1]
 
 
 def _with_inlets(rate: Field, walls: tuple[WallPlane, WallPlane], axis: int) -> Field:

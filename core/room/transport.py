@@ -14,12 +14,13 @@ from core.room.grid import (
     Cells,
     RoomGrid,
     Velocity,
+    closed,
     cut,
     difference,
     face_mean,
     first_plane,
     last_plane,
-    with_walls,
+    within,
 )
 
 Field = Float[Array, "..."]
@@ -56,13 +57,14 @@ def scalar_rate(
     """-div(u c) + div(a grad c) without the walls' diffusive flux; `inflow[axis]` is (low, high) values."""
     flux_of = limited_flux if limited else upwind_flux
     rate = jnp.zeros_like(field)
+    diffusivity = closed(diffusivity_m2_s)
     for a in AXES:
         low, high = boundary.walls[a]
         padded = inflow_ghosts(field, (low.normal_m_s, inflow[a][0]), (high.normal_m_s, inflow[a][1]), a)
         flux = flux_of(padded, velocity[a], a)
-        diffusive = face_mean(diffusivity_m2_s, a) * difference(field, a) / grid.spacing_m[a]
-        wall = jnp.zeros_like(low.normal_m_s)
-        rate = rate + difference(with_walls(wall, diffusive, wall, a) - flux, a) / grid.spacing_m[a]
+        gradient = difference(cut(padded, 1, -1, a), a) / grid.spacing_m[a]
+        inside = within(diffusivity, tuple(b for b in AXES if b != a))
+        rate = rate + difference(face_mean(inside, a) * gradient - flux, a) / grid.spacing_m[a]
     return rate
 
 
