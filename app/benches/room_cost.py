@@ -3,7 +3,8 @@
 A march runs from air at rest with the plane's profile until the standard preset would stop it; another starts
 from a coarse room that has settled, as a reconstruction's does. Beside both is the error of u that they leave.
 Derivatives are restarts of the settled room with one parameter moved each, as the fit makes them; with two
-threads they run beside each other. Memory is the process': one grid a call for its own.
+threads they run beside each other. Memory is the process', after the march from rest and after the one from a
+coarse room: one grid a call for its own.
 """
 
 import json
@@ -73,9 +74,10 @@ def cost_row(volume: RoomVolume, cells: int, *, jacobian: bool) -> dict[str, flo
         "left_change": base.flow.change,
         "outcome": base.flow.outcome.name,
         "u_rel": _error(base, volume),
+        "memory_mb": _memory_mb(),
     }
     row |= _from_coarse(problem, where, prior, settings, volume)
-    row["memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    row["memory_with_coarse_mb"] = _memory_mb()
     return row | (_derivatives(where, prior, base, settings, run_s) if jacobian else {})
 
 
@@ -91,6 +93,11 @@ def _from_coarse(
     flow = carried_over(settled.flow.last, coarse.grid, where.grid)
     base = attempt(where, prior.mean, flow, settings.refine_s, _VERTICES, _quiet)
     return {"from_coarse_cpu_s": time.process_time() - began_s, "from_coarse_u_rel": _error(base, volume)}
+
+
+def _memory_mb() -> float:
+    """The process' largest so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def _compiled(where: Room, prior: Prior, start: Flow) -> float:
@@ -140,7 +147,8 @@ def _sentence(row: dict[str, float | str]) -> str:
         f"{row['cells']}: {row['run_cpu_s']:.1f} CPU s for {row['model_s']:.0f} s of air in {row['steps']:.0f} "
         f"steps ({row['outcome']}, change {row['left_change']:.3f}), u {row['u_rel']:.3f}; from a coarse room, "
         f"its own march counted, {row['from_coarse_cpu_s']:.1f} CPU s, u {row['from_coarse_u_rel']:.3f}; "
-        f"compiled in {row['compile_s']:.1f} s; {row['memory_mb']:.0f} MB"
+        f"compiled in {row['compile_s']:.1f} s; {row['memory_mb']:.0f} MB, "
+        f"{row['memory_with_coarse_mb']:.0f} MB with the coarse room"
     )
     if "gain_of_second_thread" in row:
         text += (
