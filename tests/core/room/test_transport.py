@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from core.room.boundary import closed_room
-from core.room.grid import RoomGrid
+from core.room.grid import RoomGrid, closed, face_mean
 from core.room.transport import limited_flux, scalar_rate
 
 GRID = RoomGrid(cells=(8, 6, 7), lower_m=(0.0, 0.0, 0.0), spacing_m=(0.1, 0.2, 0.15))
@@ -50,3 +50,15 @@ def test_a_closed_room_keeps_its_heat():
     rate = scalar_rate(field, zero, (u, v, w), jnp.full(GRID.cells, 1e-2), closed_room(GRID), GRID)
 
     assert abs(float(rate.sum())) < 1e-4 * float(jnp.abs(rate).sum())
+
+
+def test_a_closed_diffusivity_is_zero_on_walls_and_the_cells_between_them():
+    cells = jax.random.uniform(jax.random.key(0), GRID.cells)
+
+    sealed = closed(cells)
+
+    assert np.array_equal(sealed[1:-1, 1:-1, 1:-1], cells)
+    for axis in range(3):
+        faces = np.asarray(face_mean(sealed, axis))
+        beyond = faces.take([0, -1], axis=axis)
+        assert not beyond.any()
