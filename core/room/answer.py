@@ -12,7 +12,7 @@ from core.room.fit import Posterior
 from core.room.grid import AXES, WALLS
 from core.room.observe import Observations, Prediction
 from core.room.prior import Prior
-from core.room.residue import temperature_correction
+from core.room.residue import Correction, temperature_correction
 from core.room.runs import DIFFERENCE, Attempt
 from core.room.sentences import balances, contradictions, misfit, undetermined
 from core.room.setup import RoomLayout
@@ -44,9 +44,7 @@ def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
     values, _, _ = solved.data.values()
     residual = values - solved.data.predicted(best.seen)
     local_k = departure(best.seen.excess_k)
-    change = temperature_correction(
-        solved.data, best.seen.excess_k, residual, local_k, level_std_k(solved), unknown_walls(solved.prior)
-    )
+    change = last_correction(solved.data, solved.prior, solved.runs, best)
     free = free_vertices(solved.layout, best.seen.excess_k.shape)
     excess = best.seen.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     variances = (change.prior_variance_k2[:, None, :] * free, change.variance_k2[:, None, :] * free)
@@ -72,6 +70,30 @@ def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
     )
 
 
+def last_correction(data: Observations, prior: Prior, runs: list[Prediction], best: Attempt) -> Correction:
+    """The correction of T by all that parameters leave unexplained."""
+    excess_k, (values, _, _) = best.seen.excess_k, data.values()
+    own_k = departure(excess_k)
+    level_k = max(own_k, level_std_k(runs))
+    return temperature_correction(
+        data, excess_k, values - data.predicted(best.seen), own_k, level_k, unknown_walls(prior)
+    )
+
+
+def corrected_profile_k(
+    data: Observations, prior: Prior, runs: list[Prediction], best: Attempt, layout: RoomLayout
+) -> Float[np.ndarray, " nz"]:
+    """Mean excess temperature of each layer of cells, with the correction."""
+    excess_k = best.seen.excess_k
+    change = last_correction(data, prior, runs, best).excess_k[:, None, :] * free_vertices(
+        layout, excess_k.shape
+    )
+    share = layout.grid.centres_m(2) - layout.grid.faces_m(2)[0]
+    heights = np.linspace(0.0, layout.grid.faces_m(2)[-1] - layout.grid.faces_m(2)[0], excess_k.shape[2])
+    warmer_k = np.interp(share, heights, change[1:-1, 1:-1].mean((0, 1)))
+    return np.asarray(best.flow.mean.excess_k, float).mean((0, 1)) + warmer_k
+
+
 def sentences(
     solved: Solved, residual: Float[np.ndarray, " data"], values: Float[np.ndarray, " data"]
 ) -> list[str]:
@@ -83,8 +105,15 @@ def sentences(
         *undetermined(solved.problem),
         *contradictions(solved.problem, solved.prior, solved.posterior),
         *misfit(solved.data, unexplained(solved.data, residual, values)),
-        *balances(parameters, inflow, solved.best.seen.outflow_excess_k, solved.problem),
+        *balances(parameters, inflow, solved.best.seen.outflow_excess_k, solved.problem, held_k_m3_s(solved)),
     ]
+
+
+def held_k_m3_s(solved: Solved) -> float:
+    """What it took to hold the profile that measurements say, over the whole room."""
+    rate, grid = solved.best.flow.held_k_s, solved.layout.grid
+    layer_m3 = grid.volume_m3 * grid.cells[0] * grid.cells[1]
+    return 0.0 if rate is None else layer_m3 * float(np.asarray(rate).sum())
 
 
 def unexplained(
@@ -113,11 +142,10 @@ def carried_m2_s2(
     return cumulative_trapezoid(buoyancy, z_m, initial=0.0)
 
 
-def level_std_k(solved: Solved) -> float:
+def level_std_k(runs: list[Prediction]) -> float:
     """How far what was stated leaves the level open: a room's temperature balances what nobody knows exactly."""
-    moved = [float((run.excess_k - solved.runs[0].excess_k).mean()) for run in solved.runs[1:]]
-    own = departure(solved.best.seen.excess_k)
-    return max(own, float(np.linalg.norm(moved)) / DIFFERENCE)
+    moved = [float((run.excess_k - runs[0].excess_k).mean()) for run in runs[1:]]
+    return float(np.linalg.norm(moved)) / DIFFERENCE
 
 
 def unknown_walls(prior: Prior) -> list[str]:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -39,8 +40,9 @@ class RoomSettings:
 
     The coarse room is corrected while a parameter moves by more than `coarse_step` prior deviations and
     the misfit falls below `worthwhile` of what it was: a coarse grid's own error must not move the rest.
-    A Jacobian serves for `straight` prior deviations. The fine room's last march, the longest, follows a step below
-    `fine_step`. `wall_heat` multiplies what the balance, or the usual guess, gives for the walls' heat coefficient.
+    A Jacobian serves for `straight` prior deviations. The fine room's rounds end with a step below
+    `fine_step`; the longest march, `final_s`, follows. `wall_heat` multiplies what the balance, or the usual
+    guess, gives for the walls' heat coefficient.
     """
 
     cells: int = 48
@@ -55,7 +57,7 @@ class RoomSettings:
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 60.0
-    final_s: float = 150.0
+    final_s: float = 90.0
     use_images: bool = True
     log_viscosity_std: float = 0.0
     wall_heat: float = 1.0
@@ -110,8 +112,13 @@ def attempt(
     seconds: float,
     vertices: tuple[int, int, int],
     tell: Event,
+    *,
+    profile_k: Float[np.ndarray, " nz"] | None = None,
 ) -> Attempt:
-    """March `flow` under these parameters and look at its mean; seconds are those of the reference room."""
+    """March `flow` under these parameters and look at its mean; seconds are those of the reference room.
+
+    Layers are kept at the mean excess temperatures `profile_k` where they are given.
+    """
     model = where.model(parameters)
     flow = eqx.tree_at(lambda f: f.velocity, flow, set_normal(flow.velocity, model.boundary))
     pace = where.pace
@@ -123,7 +130,8 @@ def attempt(
         level_ahead_s=20.0 * pace,
         most_steps=round(_STEPS * float(np.prod(where.grid.cells)) ** (1 / 3) * seconds),
     )
-    done = march(flow, model, timing, on_window=tell)
+    held = None if profile_k is None else jnp.asarray(profile_k, jnp.float32)
+    done = march(flow, model, timing, profile_k=held, on_window=tell)
     return Attempt(parameters, done, seen(done.mean, model, vertices))
 
 

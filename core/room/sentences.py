@@ -13,6 +13,8 @@ from core.scene import Heater, Inlet
 
 # An entry is contradicted when the fit moves it by this many of its stated deviations, and of its own.
 _SIGMAS = 2.0
+# Of the heat that supplies bring: what is missing beyond that is said.
+_MISSING_SHARE = 0.1
 _POOR_FIT = 0.35
 
 
@@ -73,18 +75,29 @@ def balances(
     inflows_m3_s: Float[np.ndarray, " inlets"],
     outflow_excess_k: float,
     problem: Problem,
+    held_k_m3_s: float = 0.0,
 ) -> list[str]:
-    """Heat that comes with the supplies and leaves through outlet and walls."""
+    """Heat that comes with the supplies and leaves through outlet and walls.
+
+    `held_k_m3_s` is what keeping the measured profile took, over the whole room.
+    """
     inflow_m3_s = float(inflows_m3_s.sum())
     if inflow_m3_s <= 0:
         return []
     capacity_w_m3_k = problem.scene.air.density_kg_m3 * 1006.0
     brought = capacity_w_m3_k * float(np.dot(inflows_m3_s, np.asarray(parameters.inlet_excess_k)))
     carried = capacity_w_m3_k * inflow_m3_s * outflow_excess_k
-    return [
+    said = [
         f"Supply air brings {brought:.0f} W above ambient; {carried:.0f} W leave by the outlets and "
         f"{brought - carried:.0f} W through walls and heaters. {3600 * inflow_m3_s:.0f} m3/h flow through."
     ]
+    missing = capacity_w_m3_k * held_k_m3_s
+    if abs(missing) > _MISSING_SHARE * abs(brought):
+        said.append(
+            f"The temperatures that were measured take {abs(missing):.0f} W {'more' if missing > 0 else 'less'} "
+            "than supply, heaters and walls bring in the fitted room: a source, a leak or a wall is not as stated."
+        )
+    return said
 
 
 def undetermined(problem: Problem) -> list[str]:

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 
 from core.problem import Problem
 from core.result import Solution
-from core.room.answer import Solved, solution
+from core.room.answer import Solved, corrected_profile_k, solution
 from core.room.fit import Posterior, gauss_newton, weighted_variance
 from core.room.observe import Observations, Prediction, observations
 from core.room.plane_openings import with_plane_openings
@@ -36,7 +36,8 @@ Vector = Float[np.ndarray, " active"]
 
 # A correction that leaves more than this of the least misfit so far did harm: the room before it is kept. Below
 # it, the room may only not have settled yet; the one that is given back leaves no more than `_WORSE` of the least.
-_HARM, _WORSE = 1.5, 1.15
+# After so many rounds without a lesser misfit the derivatives have no more to say.
+_HARM, _WORSE, _PATIENCE = 1.5, 1.15, 2
 
 
 class Begun(eqx.Module):
@@ -94,10 +95,12 @@ def finish(
     vector, base, jacobian = coarse_fit(begun, data, settings, tell)
     other = otherwise_closed(coarse, prior.parameters(vector), base, settings, vertices)
     first = begun.first
-    seconds = settings.refine_s if settings.use_images else settings.final_s
+    seconds = settings.refine_s + (0.0 if settings.use_images else settings.final_s)
     if np.any(vector) or not settings.use_images:
         first = attempt(fine, prior.parameters(vector), first.flow.last, seconds, vertices, tell)
     posterior, best = fine_fit(fine, prior, data, vector, first, jacobian, settings, tell)
+    if settings.use_images:
+        best = held_fit(fine, prior, data, best, jacobian, settings, tell)
     tell(supplied(fine, best))
     solved = Solved(problem, data, prior, posterior, jacobian, other, first.seen, best, fine.layout)
     return solution(solved, time.perf_counter() - start_s, use_images=settings.use_images)
@@ -150,33 +153,58 @@ def fine_fit(
     posterior = at_least = Posterior(vector, np.eye(len(vector)), np.zeros(0))
     grid_difference = data.predicted(first.seen) - data.predicted(jacobian[0])
 
-    def marched(towards: Posterior, seconds: float, name: float) -> tuple[Attempt, float]:
-        tried = attempt(fine, prior.parameters(towards.vector), best.flow.last, seconds, data.vertices, tell)
+    def marched(towards: Posterior, name: float) -> tuple[Attempt, float]:
+        where, seconds = prior.parameters(towards.vector), settings.refine_s
+        tried = attempt(fine, where, best.flow.last, seconds, data.vertices, tell)
         left = misfit_ratio(data, tried, least)
         tell({"round": name, "misfit_left": left, **fitted(prior, towards.vector)})
         return tried, left
 
+    stale = 0
     for n in range(settings.rounds if settings.use_images else 0):
         new = corrected(posterior.vector, best, data, jacobian, grid_difference, firm=prior.firm())
         step = float(np.abs(new.vector - posterior.vector).max(initial=0.0))
-        last = n == settings.rounds - 1 or step < settings.fine_step
-        seconds = settings.final_s if last else settings.refine_s
-        tried, left = marched(new, seconds, n + 1.0)
+        tried, left = marched(new, n + 1.0)
         if left > _HARM:
             # Half of a step that did harm: the derivatives are a coarser room's.
             new = Posterior(0.5 * (posterior.vector + new.vector), new.covariance, new.deviation)
-            tried, left = marched(new, seconds, n + 1.5)
+            tried, left = marched(new, n + 1.5)
         if left > _HARM:
             posterior = Posterior(posterior.vector, new.covariance, new.deviation)
             break
         posterior, best = new, tried
+        stale = 0 if left < 1.0 else stale + 1
         if left < 1.0:
             at_least, least = new, tried
-        if last:
+        if step < settings.fine_step or stale == _PATIENCE:
             break
     if misfit_ratio(data, best, least) > _WORSE:
         return Posterior(at_least.vector, posterior.covariance, posterior.deviation), least
     return posterior, best
+
+
+def held_fit(
+    fine: Room,
+    prior: Prior,
+    data: Observations,
+    best: Attempt,
+    runs: list[Prediction],
+    settings: RoomSettings,
+    tell: Event,
+) -> Attempt:
+    """The room once more with its layers kept at the temperatures that measurements say, the longest march last.
+
+    What parameters leave of the profile bends the jets: a room that has it right has the better velocity.
+    """
+    held = best
+    for seconds in (settings.refine_s, settings.final_s):
+        profile_k = corrected_profile_k(data, prior, runs, held, fine.layout)
+        held = attempt(
+            fine, best.parameters, held.flow.last, seconds, data.vertices, tell, profile_k=profile_k
+        )
+        left = misfit_ratio(data, held, best)
+        tell({"held_s": seconds, "misfit_left": left})
+    return best if left > _WORSE else held
 
 
 def supplied(fine: Room, best: Attempt) -> dict[str, float]:

@@ -125,3 +125,27 @@ def test_a_march_begins_no_window_after_its_most_steps():
     assert 100 <= end.steps <= 100 + 40
     assert end.model_s < 10.0
     assert end.outcome is Outcome.step_limit
+
+
+def test_a_march_keeps_the_profile_it_is_asked_for_and_says_what_that_took():
+    def cold(wall: WallPlane) -> WallPlane:
+        conductance = jnp.full(wall.normal_m_s.shape, 0.1)
+        return eqx.tree_at(lambda w: w.conductance_m_s, wall, conductance)
+
+    # A wall at zero excess takes heat from air that is to stay stratified between 0.5 and 1 K.
+    model = flat_room(8, 0.01, (cold, as_it_is), (as_it_is, as_it_is), 1.0)
+    profile_k = jnp.linspace(0.5, 1.0, 8)
+    start = air_at_rest(model, jnp.full(model.grid.cells, 2.0), 0.1)
+    settings = MarchSettings(longest_s=6.0, window_s=0.2, tolerance=0.0)
+
+    held = march(start, model, settings, profile_k=profile_k)
+    free = march(start, model, settings)
+
+    found = np.asarray(held.mean.excess_k.mean((0, 1)))
+    # What a window of 0.2 s loses: 0.1 m/s through one wall of eight cells of 1/8 m.
+    assert found == pytest.approx(np.asarray(profile_k), abs=0.03)
+    assert np.abs(np.asarray(free.mean.excess_k.mean((0, 1))) - profile_k).max() > 0.2
+    # Heat balance of the whole room: it loses h T beside the wall over the room's unit width.
+    lost_k_s = 0.1 * float(held.mean.excess_k[0].mean())
+    assert float(held.held_k_s.mean()) == pytest.approx(lost_k_s, rel=0.05)
+    assert free.held_k_s is None
