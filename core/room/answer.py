@@ -25,7 +25,10 @@ _SHARES = {"excess_k": (0.1, 1.0, 0.2), "pressure_m2_s2": (0.3, 2.0, 5.0), "velo
 
 
 class Solved(eqx.Module):
-    """Everything that a solve leaves behind: what a solution and its deviations are made of."""
+    """Everything that a solve leaves behind: what a solution and its deviations are made of.
+
+    `before` is the room that parameters alone make, `best` the same with its profile held.
+    """
 
     problem: Problem
     data: Observations
@@ -34,19 +37,21 @@ class Solved(eqx.Module):
     runs: list[Prediction]
     other: Prediction
     first: Prediction
+    before: Attempt
     best: Attempt
     layout: RoomLayout
 
 
-def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
-    """The room as a result, with the temperature's last correction, deviations and sentences."""
+def solution(solved: Solved, seconds: float, *, use_images: bool, notes: tuple[str, ...] = ()) -> Solution:
+    """The room as a result, with the temperature's last correction, deviations and sentences after `notes`."""
     best, box, problem = solved.best, solved.problem.scene.room, solved.problem
     values, _, _ = solved.data.values()
     residual = values - solved.data.predicted(best.seen)
     local_k = departure(best.seen.excess_k)
-    change = last_correction(solved.data, solved.prior, solved.runs, best)
     free = free_vertices(solved.layout, best.seen.excess_k.shape)
-    excess = best.seen.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
+    start = unheld(best.seen, solved.before.seen, solved.data, free)
+    change = last_correction(solved.data, solved.prior, solved.runs, start)
+    excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     variances = (change.prior_variance_k2[:, None, :] * free, change.variance_k2[:, None, :] * free)
     share = unexplained(solved.data, residual, values)
     temperature = _deviation(solved, "excess_k", local_k, share, variances)
@@ -66,32 +71,55 @@ def solution(solved: Solved, seconds: float, *, use_images: bool) -> Solution:
         temperature.informed,
         outcome=best.flow.outcome,
         solver_s=seconds,
-        notes=tuple(sentences(solved, residual, values)),
+        notes=(*notes, *sentences(solved, residual, values)),
     )
 
 
-def last_correction(data: Observations, prior: Prior, runs: list[Prediction], best: Attempt) -> Correction:
+def last_correction(data: Observations, prior: Prior, runs: list[Prediction], seen: Prediction) -> Correction:
     """The correction of T by all that parameters leave unexplained."""
-    excess_k, (values, _, _) = best.seen.excess_k, data.values()
-    own_k = departure(excess_k)
+    own_k = departure(seen.excess_k)
     level_k = max(own_k, level_std_k(runs))
-    return temperature_correction(
-        data, excess_k, values - data.predicted(best.seen), own_k, level_k, unknown_walls(prior)
-    )
+    residual = data.values()[0] - data.predicted(seen)
+    return temperature_correction(data, seen.excess_k, residual, own_k, level_k, unknown_walls(prior))
+
+
+def unheld(
+    held: Prediction, before: Prediction, data: Observations, free: Float[np.ndarray, "vx vy vz"]
+) -> Prediction:
+    """A room whose profile was held, with that which it had before: a correction is of what the model says."""
+    shift_k = layer_means(held.excess_k) - layer_means(before.excess_k)
+    outflow_k = held.outflow_excess_k
+    for outlet in data.outlets:
+        patch, box = outlet.patch, data.scene.room
+        ends_m = {"z_min": box.lower_m[2], "z_max": box.upper_m[2]}
+        height_m = ends_m.get(patch.wall, 0.5 * (patch.lower_m[1] + patch.upper_m[1]))
+        heights_m = np.linspace(box.lower_m[2], box.upper_m[2], len(shift_k))
+        outflow_k -= float(np.interp(height_m, heights_m, shift_k))
+    return Prediction(held.excess_k - shift_k * free, held.pressure_m2_s2, held.velocity_m_s, outflow_k)
 
 
 def corrected_profile_k(
-    data: Observations, prior: Prior, runs: list[Prediction], best: Attempt, layout: RoomLayout
+    data: Observations,
+    prior: Prior,
+    runs: list[Prediction],
+    held: Attempt,
+    before: Attempt,
+    layout: RoomLayout,
 ) -> Float[np.ndarray, " nz"]:
-    """Mean excess temperature of each layer of cells, with the correction."""
-    excess_k = best.seen.excess_k
-    change = last_correction(data, prior, runs, best).excess_k[:, None, :] * free_vertices(
-        layout, excess_k.shape
-    )
-    share = layout.grid.centres_m(2) - layout.grid.faces_m(2)[0]
-    heights = np.linspace(0.0, layout.grid.faces_m(2)[-1] - layout.grid.faces_m(2)[0], excess_k.shape[2])
-    warmer_k = np.interp(share, heights, change[1:-1, 1:-1].mean((0, 1)))
-    return np.asarray(best.flow.mean.excess_k, float).mean((0, 1)) + warmer_k
+    """Mean excess temperature of each layer of cells of the room `before` its profile was held, corrected."""
+    free = free_vertices(layout, held.seen.excess_k.shape)
+    start = unheld(held.seen, before.seen, data, free)
+    change = last_correction(data, prior, runs, start).excess_k[:, None, :] * free
+    warmer_k = layer_means(start.excess_k + change) - layer_means(held.seen.excess_k)
+    faces_m = layout.grid.faces_m(2)
+    heights_m = np.linspace(faces_m[0], faces_m[-1], len(warmer_k))
+    in_cells_k = np.interp(layout.grid.centres_m(2), heights_m, warmer_k)
+    return np.asarray(held.flow.mean.excess_k, float).mean((0, 1)) + in_cells_k
+
+
+def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"]:
+    """Mean of a field at each height, side walls left out."""
+    return field[1:-1, 1:-1].mean((0, 1))
 
 
 def sentences(
@@ -124,6 +152,12 @@ def unexplained(
     if not shifts.any():
         return _UNSEEN_SHARE
     return float(np.linalg.norm(residual[shifts]) / max(float(np.linalg.norm(values[shifts])), 1e-30))
+
+
+def left_unexplained(solved: Solved, seen: Prediction) -> float:
+    """Share (rms) of the measured shifts that a room leaves."""
+    values, _, _ = solved.data.values()
+    return unexplained(solved.data, values - solved.data.predicted(seen), values)
 
 
 def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.ndarray, "vx vy vz"]:

@@ -57,7 +57,7 @@ class RoomSettings:
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 60.0
-    final_s: float = 90.0
+    final_s: float = 150.0
     use_images: bool = True
     log_viscosity_std: float = 0.0
     wall_heat: float = 1.0
@@ -156,6 +156,11 @@ def perturbed(
         return list(pool.map(one, steps))
 
 
+def other_closure(where: Room) -> str:
+    """The closure that a room is held against."""
+    return "constant" if where.closure == "zero_equation" else "zero_equation"
+
+
 def otherwise_closed(
     where: Room,
     parameters: RoomParameters,
@@ -164,8 +169,7 @@ def otherwise_closed(
     vertices: tuple[int, int, int],
 ) -> Prediction:
     """The settled room again under another closure: what turbulence modelling leaves open."""
-    name = "zero_equation" if where.closure != "zero_equation" else "constant"
     last = base.flow.last
     flow = Flow(last.velocity, last.excess_k, last.pressure_m2_s2, None)
-    another = room(where.scene, settings.coarse_cells, name)
+    another = room(where.scene, settings.coarse_cells, other_closure(where))
     return attempt(another, parameters, flow, settings.restart_s, vertices, lambda _: None).seen

@@ -70,6 +70,14 @@ def misfit(data: Observations, share: float) -> list[str]:
     return said
 
 
+def another_closure(name: str, left: float, stated: str, stated_left: float) -> str:
+    """Why a closure was taken that is not the default one."""
+    return (
+        f"The images are explained better under the {name} closure ({100 * left:.0f} % of the shifts left) than "
+        f"under {stated} ({100 * stated_left:.0f} %): it was taken. State flow.transport to keep one."
+    )
+
+
 def balances(
     parameters: RoomParameters,
     inflows_m3_s: Float[np.ndarray, " inlets"],

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 
 from core.problem import Problem
 from core.result import Solution
-from core.room.answer import Solved, corrected_profile_k, solution
+from core.room.answer import Solved, corrected_profile_k, left_unexplained, solution
 from core.room.fit import Posterior, gauss_newton, weighted_variance
 from core.room.observe import Observations, Prediction, observations
 from core.room.plane_openings import with_plane_openings
@@ -26,10 +26,13 @@ from core.room.runs import (
     Event,
     RoomSettings,
     attempt,
+    other_closure,
     otherwise_closed,
     perturbed,
     settled,
 )
+from core.room.sentences import another_closure
+from core.room.setup import RoomLayout
 from core.scene import Scene
 
 Vector = Float[np.ndarray, " active"]
@@ -65,10 +68,13 @@ def solve_room(
     return finish(begin(problem, settings, tell), problem, settings, tell, start_s=start_s)
 
 
-def begin(problem: Problem, settings: RoomSettings, tell: Event) -> Begun:
-    """What is the same for all images of a room: both grids as stated, and the coarse one's derivatives."""
+def begin(problem: Problem, settings: RoomSettings, tell: Event, closure: str | None = None) -> Begun:
+    """What is the same for all images of a room: both grids as stated, and the coarse one's derivatives.
+
+    `closure` is another than the scene's.
+    """
     problem = with_plane_openings(problem)
-    closure = closure_name(problem.scene)
+    closure = closure or closure_name(problem.scene)
     coarse, fine = (room(problem.scene, n, closure) for n in (settings.coarse_cells, settings.cells))
     vertices = (settings.vertices, settings.vertices, settings.vertices)
     prior = room_prior(
@@ -86,7 +92,33 @@ def begin(problem: Problem, settings: RoomSettings, tell: Event) -> Begun:
 def finish(
     begun: Begun, problem: Problem, settings: RoomSettings, tell: Event, *, start_s: float
 ) -> Solution:
-    """The solution for the shifts of `problem`, another measurement of the room that was begun."""
+    """The solution for the shifts of `problem`, another measurement of the room that was begun.
+
+    Where a coarse room under another closure explains the images better than the best fine one does, and nobody
+    stated the closure, that one is fitted as well and the better of the two is taken.
+    """
+    solved = fitted_room(begun, problem, settings, tell)
+    notes: tuple[str, ...] = ()
+    name = promising_closure(solved, begun.coarse) if settings.use_images else None
+    if name is not None:
+        again = fitted_room(begin(problem, settings, tell, name), problem, settings, tell)
+        left = [left_unexplained(s, s.best.seen) for s in (solved, again)]
+        if left[1] < left[0]:
+            solved, notes = again, (another_closure(name, left[1], begun.coarse.closure, left[0]),)
+    tell(supplied(solved.layout, solved.best))
+    return solution(solved, time.perf_counter() - start_s, use_images=settings.use_images, notes=notes)
+
+
+def promising_closure(solved: Solved, coarse: Room) -> str | None:
+    """The other closure if a coarse room under it leaves less of the images than the fitted one; None if stated."""
+    if solved.problem.scene.flow.transport != "auto":
+        return None
+    better = left_unexplained(solved, solved.other) < left_unexplained(solved, solved.best.seen)
+    return other_closure(coarse) if better else None
+
+
+def fitted_room(begun: Begun, problem: Problem, settings: RoomSettings, tell: Event) -> Solved:
+    """Parameters and profile that the images ask for, and what deviations are made of."""
     coarse, fine, prior = begun.coarse, begun.fine, begun.prior
     stated = begun.problem
     problem = Problem(stated.scene, problem.shifts, stated.planes, stated.sensors)
@@ -98,12 +130,11 @@ def finish(
     seconds = settings.refine_s + (0.0 if settings.use_images else settings.final_s)
     if np.any(vector) or not settings.use_images:
         first = attempt(fine, prior.parameters(vector), first.flow.last, seconds, vertices, tell)
-    posterior, best = fine_fit(fine, prior, data, vector, first, jacobian, settings, tell)
+    posterior, before = fine_fit(fine, prior, data, vector, first, jacobian, settings, tell)
+    best = before
     if settings.use_images:
-        best = held_fit(fine, prior, data, best, jacobian, settings, tell)
-    tell(supplied(fine, best))
-    solved = Solved(problem, data, prior, posterior, jacobian, other, first.seen, best, fine.layout)
-    return solution(solved, time.perf_counter() - start_s, use_images=settings.use_images)
+        best = held_fit(fine, prior, data, before, jacobian, settings, tell)
+    return Solved(problem, data, prior, posterior, jacobian, other, first.seen, before, best, fine.layout)
 
 
 def coarse_fit(
@@ -187,30 +218,30 @@ def held_fit(
     fine: Room,
     prior: Prior,
     data: Observations,
-    best: Attempt,
+    before: Attempt,
     runs: list[Prediction],
     settings: RoomSettings,
     tell: Event,
 ) -> Attempt:
-    """The room once more with its layers kept at the temperatures that measurements say, the longest march last.
+    """The room `before` with its layers kept at the temperatures that measurements say, the longest march last.
 
     What parameters leave of the profile bends the jets: a room that has it right has the better velocity.
     """
-    held = best
+    held, left = before, 1.0
     for seconds in (settings.refine_s, settings.final_s):
-        profile_k = corrected_profile_k(data, prior, runs, held, fine.layout)
+        profile_k = corrected_profile_k(data, prior, runs, held, before, fine.layout)
         held = attempt(
-            fine, best.parameters, held.flow.last, seconds, data.vertices, tell, profile_k=profile_k
+            fine, before.parameters, held.flow.last, seconds, data.vertices, tell, profile_k=profile_k
         )
-        left = misfit_ratio(data, held, best)
+        left = misfit_ratio(data, held, before)
         tell({"held_s": seconds, "misfit_left": left})
-    return best if left > _WORSE else held
+    return before if left > _WORSE else held
 
 
-def supplied(fine: Room, best: Attempt) -> dict[str, float]:
+def supplied(layout: RoomLayout, best: Attempt) -> dict[str, float]:
     """Excess temperature and speed of every supply in the room that was found."""
     found: dict[str, float] = {}
-    for n, velocity in enumerate(fine.layout.inlet_velocity_m_s):
+    for n, velocity in enumerate(layout.inlet_velocity_m_s):
         speed = float(np.linalg.norm(velocity)) * float(np.exp(best.parameters.inlet_log_flow[n]))
         found |= {
             f"supply_{n + 1}_excess_k": float(best.parameters.inlet_excess_k[n]),

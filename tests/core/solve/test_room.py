@@ -1,4 +1,5 @@
 import dataclasses
+from typing import Literal
 
 import equinox as eqx
 import jax
@@ -12,7 +13,15 @@ from core.rays.operator import build
 from core.result import Solution
 from core.room.observe import observations
 from core.scene import FixedTexture, FlowModel, Inlet, Outlet, Patch, Scene, View, Wall
-from core.solve.room import RoomSettings, begin, fine_fit, misfit_ratio, solve_room
+from core.solve.room import (
+    RoomSettings,
+    begin,
+    fine_fit,
+    fitted_room,
+    misfit_ratio,
+    promising_closure,
+    solve_room,
+)
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(2.0, 2.0, 2.0))
 SUPPLY = Inlet(
@@ -25,13 +34,13 @@ SETTINGS = RoomSettings(
 )
 
 
-def scene(supply: Inlet) -> Scene:
+def scene(supply: Inlet, flow: FlowModel = FlowModel(transport="given", viscosity_m2_s=2e-3)) -> Scene:
     camera = looking_along_y(position_m=(1.0, -8.0, 1.0), width_px=200, height_px=200, focal_px=900.0)
     return Scene(
         room=ROOM,
         views=(View(camera=camera),),
         light=FixedTexture(),
-        flow=FlowModel(transport="given", viscosity_m2_s=2e-3),
+        flow=flow,
         boundary=(
             supply,
             Outlet(patch=Patch(wall="x_min", lower_m=(0.7, 0.1), upper_m=(1.3, 0.5))),
@@ -51,9 +60,8 @@ def truth() -> Solution:
     return solve_room(Problem(scene(SUPPLY), ()), SETTINGS)
 
 
-def measured(entered: Inlet, truth: Solution, noise_px: float) -> Problem:
-    """What a camera and a plane of thermometers see of the truth, with the supply as entered."""
-    where = scene(entered)
+def measured(where: Scene, truth: Solution, noise_px: float) -> Problem:
+    """What a camera and a plane of thermometers see of the truth, with the scene as entered."""
     centres = np.stack(np.meshgrid(np.arange(8.0, 200, 16), np.arange(8.0, 200, 16)), -1).reshape(-1, 2)
     operator = build(where, 0, centres, truth.temperature_k.shape, 16.0)
     excess = where.air.excess_refractivity(jnp.asarray(truth.temperature_k - 293.15, jnp.float32))
@@ -73,7 +81,7 @@ def measured(entered: Inlet, truth: Solution, noise_px: float) -> Problem:
 
 def test_images_repair_a_supply_that_was_entered_wrongly(truth: Solution):
     wrong = dataclasses.replace(SUPPLY, temperature_k=305.15, velocity_m_s=(0.48, 0.0, 0.0))
-    problem = measured(wrong, truth, 1e-5)
+    problem = measured(scene(wrong), truth, 1e-5)
 
     found = solve_room(problem, SETTINGS)
 
@@ -94,7 +102,7 @@ def test_images_repair_a_supply_that_was_entered_wrongly(truth: Solution):
 
 def test_derivatives_that_point_the_wrong_way_leave_a_room_no_worse_than_stated(truth: Solution):
     wrong = dataclasses.replace(SUPPLY, temperature_k=304.15, velocity_m_s=(0.44, 0.0, 0.0))
-    problem = measured(wrong, truth, 1e-5)
+    problem = measured(scene(wrong), truth, 1e-5)
     begun = begin(problem, SETTINGS, lambda _: None)
     data = observations(problem, (SETTINGS.vertices,) * 3)
     start, *moved = begun.jacobian
@@ -106,3 +114,18 @@ def test_derivatives_that_point_the_wrong_way_leave_a_room_no_worse_than_stated(
 
     assert max(event.get("misfit_left", 0.0) for event in told) > 1.15
     assert misfit_ratio(data, best, begun.first) <= 1.15
+
+
+@pytest.mark.parametrize(("transport", "wanted"), [("auto", "zero_equation"), ("k_epsilon", None)])
+def test_another_closure_is_tried_where_it_leaves_less_of_the_images(
+    truth: Solution, transport: Literal["auto", "k_epsilon"], wanted: str | None
+):
+    problem = measured(scene(SUPPLY, FlowModel(transport=transport)), truth, 1e-5)
+    begun = begin(problem, SETTINGS, lambda _: None)
+    fitted = fitted_room(begun, problem, SETTINGS, lambda _: None)
+    # As if the coarse room under the other closure were the truth itself.
+    true_k = np.asarray(truth.temperature_k - 293.15)
+    closer = eqx.tree_at(lambda s: s.other.excess_k, fitted, true_k)
+
+    assert promising_closure(closer, begun.coarse) == wanted
+    assert promising_closure(fitted, begun.coarse) is None
