@@ -81,7 +81,7 @@ def room_work(problem: Problem, flow: ExpectedFlow, settings: RoomSettings) -> W
     rounds = settings.rounds if far else min(settings.rounds, _STATED_ROUNDS)
     # One coarse correction that is tried, and the second closure's run, beside the Jacobian's.
     coarse_s = settings.settle_s + (1 + far) * restarts + 2 * settings.restart_s
-    # The room as stated, each round, and two marches whose profile is held.
+    # The room as stated, each round, and two marches that are held.
     fine_s = (2 + rounds) * settings.refine_s + settings.final_s
     steps = flow.pace / flow.step_s * flow.cell_m
     loops = 0.0

@@ -27,7 +27,7 @@ _SHARES = {"excess_k": (0.1, 1.0, 0.2), "pressure_m2_s2": (0.3, 2.0, 5.0), "velo
 class Solved(eqx.Module):
     """Everything that a solve leaves behind: what a solution and its deviations are made of.
 
-    `before` is the room that parameters alone make, `best` the same with its profile held.
+    `before` is the room that parameters alone make, `best` the same with its level, or profile, held.
     """
 
     problem: Problem
@@ -49,7 +49,7 @@ def solution(solved: Solved, seconds: float, *, use_images: bool, notes: tuple[s
     residual = values - solved.data.predicted(best.seen)
     local_k = departure(best.seen.excess_k)
     free = free_vertices(solved.layout, best.seen.excess_k.shape)
-    start = unheld(best.seen, solved.before.seen, solved.data, free)
+    start = unheld(best.seen, solved.before.seen, solved.data, solved.prior, free)
     change = last_correction(solved.data, solved.prior, solved.runs, start)
     excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     variances = (change.prior_variance_k2[:, None, :] * free, change.variance_k2[:, None, :] * free)
@@ -84,13 +84,19 @@ def last_correction(data: Observations, prior: Prior, runs: list[Prediction], se
 
 
 def unheld(
-    held: Prediction, before: Prediction, data: Observations, free: Float[np.ndarray, "vx vy vz"]
+    held: Prediction,
+    before: Prediction,
+    data: Observations,
+    prior: Prior,
+    free: Float[np.ndarray, "vx vy vz"],
 ) -> Prediction:
-    """A room whose profile was held, with that which it had before: a correction is of what the model says."""
+    """A room that was held, at the level (or profile) it had before: a correction is of what the model says."""
     shift_k = layer_means(held.excess_k) - layer_means(before.excess_k)
-    outflow_k = held.outflow_excess_k
+    if not unknown_walls(prior):
+        shift_k = np.full_like(shift_k, shift_k.mean())
+    outflow_k, box = held.outflow_excess_k, data.scene.room
     for outlet in data.outlets:
-        patch, box = outlet.patch, data.scene.room
+        patch = outlet.patch
         ends_m = {"z_min": box.lower_m[2], "z_max": box.upper_m[2]}
         height_m = ends_m.get(patch.wall, 0.5 * (patch.lower_m[1] + patch.upper_m[1]))
         heights_m = np.linspace(box.lower_m[2], box.upper_m[2], len(shift_k))
@@ -98,23 +104,27 @@ def unheld(
     return Prediction(held.excess_k - shift_k * free, held.pressure_m2_s2, held.velocity_m_s, outflow_k)
 
 
-def corrected_profile_k(
+def to_hold_k(
     data: Observations,
     prior: Prior,
     runs: list[Prediction],
     held: Attempt,
     before: Attempt,
     layout: RoomLayout,
-) -> Float[np.ndarray, " nz"]:
-    """Mean excess temperature of each layer of cells of the room `before` its profile was held, corrected."""
+) -> Float[np.ndarray, " layers"]:
+    """Corrected mean excess temperature of the room `before` it was held; `held` says its departures.
+
+    Where walls are unknown that of every layer of cells: then the room's own profile is no better than they.
+    """
     free = free_vertices(layout, held.seen.excess_k.shape)
-    start = unheld(held.seen, before.seen, data, free)
+    start = unheld(held.seen, before.seen, data, prior, free)
     change = last_correction(data, prior, runs, start).excess_k[:, None, :] * free
     warmer_k = layer_means(start.excess_k + change) - layer_means(held.seen.excess_k)
     faces_m = layout.grid.faces_m(2)
     heights_m = np.linspace(faces_m[0], faces_m[-1], len(warmer_k))
     in_cells_k = np.interp(layout.grid.centres_m(2), heights_m, warmer_k)
-    return np.asarray(held.flow.mean.excess_k, float).mean((0, 1)) + in_cells_k
+    layers_k = np.asarray(held.flow.mean.excess_k, float).mean((0, 1)) + in_cells_k
+    return layers_k if unknown_walls(prior) else layers_k.mean(keepdims=True)
 
 
 def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"]:
@@ -138,10 +148,9 @@ def sentences(
 
 
 def held_k_m3_s(solved: Solved) -> float:
-    """What it took to hold the profile that measurements say, over the whole room."""
-    rate, grid = solved.best.flow.held_k_s, solved.layout.grid
-    layer_m3 = grid.volume_m3 * grid.cells[0] * grid.cells[1]
-    return 0.0 if rate is None else layer_m3 * float(np.asarray(rate).sum())
+    """What it took to hold the temperatures that measurements say, over the whole room."""
+    box = solved.problem.scene.room
+    return (solved.best.flow.held_k_s or 0.0) * float(np.prod(box.size_m))
 
 
 def unexplained(

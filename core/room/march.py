@@ -2,8 +2,8 @@
 
 The march ends when the mean flow of one window differs from the window before by less than `tolerance`
 (relative rms of velocity), at `longest_s`, or after `most_steps`. What is returned is the mean over the
-last third of the model time: coarse grids hold slow oscillations that a steady truth has not. A measured profile
-of height can be held: after each window every layer is shifted to its mean. If a value
+last third of the model time: coarse grids hold slow oscillations that a steady truth has not. Mean
+temperatures can be held, the room's or every layer's: after each window the air is shifted to them. If a value
 becomes infinite the march goes back to the last window and halves the Courant number, once.
 """
 
@@ -60,12 +60,12 @@ class MarchSettings:
 class March(eqx.Module):
     """The end of a march: last state, mean of the last third, how it ended, model time and steps.
 
-    `held_k_s` is what each layer took to keep the profile that was asked for, mean of the last third.
+    `held_k_s` is what it took to keep the temperatures that were asked for, mean of room and last third.
     """
 
     last: Flow
     mean: Flow
-    held_k_s: Float[Array, " nz"] | None
+    held_k_s: float | None = eqx.field(static=True)
     outcome: Outcome = eqx.field(static=True)
     model_s: float = eqx.field(static=True)
     steps: int = eqx.field(static=True)
@@ -77,12 +77,15 @@ def march(
     model: RoomModel,
     settings: MarchSettings,
     *,
-    profile_k: Float[Array, " nz"] | None = None,
+    held_k: Float[Array, " layers"] | None = None,
     on_window: Callable[[dict[str, Any]], object] | None = None,
 ) -> March:
-    """The steady flow that `flow` settles to, layers kept at the mean excess temperatures `profile_k` if given."""
+    """The steady flow that `flow` settles to.
+
+    It is kept at the mean excess temperatures `held_k`, of every layer or one of the room, if they are given.
+    """
     windows: list[Flow] = []
-    held: list[Float[Array, " nz"]] = []
+    held: list[float] = []
     seconds = settings.window_s
     courant, model_s, steps, marched, change = settings.courant, 0.0, 0, 0, float("inf")
     outcome = Outcome.step_limit
@@ -108,14 +111,15 @@ def march(
         if change < settings.tolerance and model_s > settings.least_s - 1e-6:
             outcome = Outcome.converged
             break
-        if profile_k is not None:
-            shift_k = profile_k - mean.excess_k.mean((0, 1))
-            held = [*held, shift_k / seconds][-_third(marched) :]
+        if held_k is not None:
+            found_k = mean.excess_k.mean((0, 1))
+            shift_k = held_k - (found_k if held_k.size > 1 else found_k.mean())
+            held = [*held, float(shift_k.mean()) / seconds][-_third(marched) :]
             flow = _shifted(new, shift_k)
         elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
             flow = _levelled(new, (new.excess_k - start.excess_k) / seconds, model, settings.level_ahead_s)
     mean = _mean(windows) if windows else flow
-    return March(flow, mean, jnp.stack(held).mean(0) if held else None, outcome, model_s, steps, change)
+    return March(flow, mean, float(np.mean(held)) if held else None, outcome, model_s, steps, change)
 
 
 def _third(windows: int) -> int:

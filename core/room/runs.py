@@ -57,7 +57,7 @@ class RoomSettings:
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 60.0
-    final_s: float = 150.0
+    final_s: float = 90.0
     use_images: bool = True
     log_viscosity_std: float = 0.0
     wall_heat: float = 1.0
@@ -113,11 +113,11 @@ def attempt(
     vertices: tuple[int, int, int],
     tell: Event,
     *,
-    profile_k: Float[np.ndarray, " nz"] | None = None,
+    held_k: Float[np.ndarray, " layers"] | None = None,
 ) -> Attempt:
     """March `flow` under these parameters and look at its mean; seconds are those of the reference room.
 
-    Layers are kept at the mean excess temperatures `profile_k` where they are given.
+    Layers, or the room, are kept at the mean excess temperatures `held_k` where those are given.
     """
     model = where.model(parameters)
     flow = eqx.tree_at(lambda f: f.velocity, flow, set_normal(flow.velocity, model.boundary))
@@ -130,8 +130,8 @@ def attempt(
         level_ahead_s=20.0 * pace,
         most_steps=round(_STEPS * float(np.prod(where.grid.cells)) ** (1 / 3) * seconds),
     )
-    held = None if profile_k is None else jnp.asarray(profile_k, jnp.float32)
-    done = march(flow, model, timing, profile_k=held, on_window=tell)
+    held = None if held_k is None else jnp.asarray(held_k, jnp.float32)
+    done = march(flow, model, timing, held_k=held, on_window=tell)
     return Attempt(parameters, done, seen(done.mean, model, vertices))
 
 

@@ -87,7 +87,7 @@ def balances(
 ) -> list[str]:
     """Heat that comes with the supplies and leaves through outlet and walls.
 
-    `held_k_m3_s` is what keeping the measured profile took, over the whole room.
+    `held_k_m3_s` is what keeping the measured temperatures took, over the whole room.
     """
     inflow_m3_s = float(inflows_m3_s.sum())
     if inflow_m3_s <= 0:

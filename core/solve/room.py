@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 
 from core.problem import Problem
 from core.result import Solution
-from core.room.answer import Solved, corrected_profile_k, left_unexplained, solution
+from core.room.answer import Solved, left_unexplained, solution, to_hold_k
 from core.room.fit import Posterior, gauss_newton, weighted_variance
 from core.room.observe import Observations, Prediction, observations
 from core.room.plane_openings import with_plane_openings
@@ -118,7 +118,7 @@ def promising_closure(solved: Solved, coarse: Room) -> str | None:
 
 
 def fitted_room(begun: Begun, problem: Problem, settings: RoomSettings, tell: Event) -> Solved:
-    """Parameters and profile that the images ask for, and what deviations are made of."""
+    """Parameters and level that measurements ask for, and what deviations are made of."""
     coarse, fine, prior = begun.coarse, begun.fine, begun.prior
     stated = begun.problem
     problem = Problem(stated.scene, problem.shifts, stated.planes, stated.sensors)
@@ -223,16 +223,14 @@ def held_fit(
     settings: RoomSettings,
     tell: Event,
 ) -> Attempt:
-    """The room `before` with its layers kept at the temperatures that measurements say, the longest march last.
+    """The room `before` kept at the mean temperatures that measurements say, the longest march last.
 
-    What parameters leave of the profile bends the jets: a room that has it right has the better velocity.
+    A level, or a profile, that parameters miss bends the jets: a room that has it right has the better velocity.
     """
     held, left = before, 1.0
     for seconds in (settings.refine_s, settings.final_s):
-        profile_k = corrected_profile_k(data, prior, runs, held, before, fine.layout)
-        held = attempt(
-            fine, before.parameters, held.flow.last, seconds, data.vertices, tell, profile_k=profile_k
-        )
+        held_k = to_hold_k(data, prior, runs, held, before, fine.layout)
+        held = attempt(fine, before.parameters, held.flow.last, seconds, data.vertices, tell, held_k=held_k)
         left = misfit_ratio(data, held, before)
         tell({"held_s": seconds, "misfit_left": left})
     return before if left > _WORSE else held

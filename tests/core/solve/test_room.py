@@ -123,9 +123,9 @@ def test_another_closure_is_tried_where_it_leaves_less_of_the_images(
     problem = measured(scene(SUPPLY, FlowModel(transport=transport)), truth, 1e-5)
     begun = begin(problem, SETTINGS, lambda _: None)
     fitted = fitted_room(begun, problem, SETTINGS, lambda _: None)
-    # As if the coarse room under the other closure were the truth itself.
+    # As if the coarse room under the other closure were the truth itself, or were no room at all.
     true_k = np.asarray(truth.temperature_k - 293.15)
-    closer = eqx.tree_at(lambda s: s.other.excess_k, fitted, true_k)
+    closer, farther = (eqx.tree_at(lambda s: s.other.excess_k, fitted, k) for k in (true_k, 0.0 * true_k))
 
     assert promising_closure(closer, begun.coarse) == wanted
-    assert promising_closure(fitted, begun.coarse) is None
+    assert promising_closure(farther, begun.coarse) is None
