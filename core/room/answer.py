@@ -9,10 +9,9 @@ from core.air import GRAVITY_M_S2
 from core.problem import Problem
 from core.result import Solution
 from core.room.fit import Posterior
-from core.room.grid import AXES, WALLS
+from core.room.hold import departure, free_vertices, last_correction, unheld
 from core.room.observe import Observations, Prediction
 from core.room.prior import Prior
-from core.room.residue import Correction, temperature_correction
 from core.room.runs import DIFFERENCE, Attempt
 from core.room.sentences import balances, contradictions, misfit, undetermined
 from core.room.setup import RoomLayout
@@ -75,63 +74,6 @@ def solution(solved: Solved, seconds: float, *, use_images: bool, notes: tuple[s
     )
 
 
-def last_correction(data: Observations, prior: Prior, runs: list[Prediction], seen: Prediction) -> Correction:
-    """The correction of T by all that parameters leave unexplained."""
-    own_k = departure(seen.excess_k)
-    level_k = max(own_k, level_std_k(runs))
-    residual = data.values()[0] - data.predicted(seen)
-    return temperature_correction(data, seen.excess_k, residual, own_k, level_k, unknown_walls(prior))
-
-
-def unheld(
-    held: Prediction,
-    before: Prediction,
-    data: Observations,
-    prior: Prior,
-    free: Float[np.ndarray, "vx vy vz"],
-) -> Prediction:
-    """A room that was held, at the level (or profile) it had before: a correction is of what the model says."""
-    shift_k = layer_means(held.excess_k) - layer_means(before.excess_k)
-    if not unknown_walls(prior):
-        shift_k = np.full_like(shift_k, shift_k.mean())
-    outflow_k, box = held.outflow_excess_k, data.scene.room
-    for outlet in data.outlets:
-        patch = outlet.patch
-        ends_m = {"z_min": box.lower_m[2], "z_max": box.upper_m[2]}
-        height_m = ends_m.get(patch.wall, 0.5 * (patch.lower_m[1] + patch.upper_m[1]))
-        heights_m = np.linspace(box.lower_m[2], box.upper_m[2], len(shift_k))
-        outflow_k -= float(np.interp(height_m, heights_m, shift_k))
-    return Prediction(held.excess_k - shift_k * free, held.pressure_m2_s2, held.velocity_m_s, outflow_k)
-
-
-def to_hold_k(
-    data: Observations,
-    prior: Prior,
-    runs: list[Prediction],
-    held: Attempt,
-    before: Attempt,
-    layout: RoomLayout,
-) -> Float[np.ndarray, " layers"]:
-    """Corrected mean excess temperature of the room `before` it was held; `held` says its departures.
-
-    Where walls are unknown that of every layer of cells: then the room's own profile is no better than they.
-    """
-    free = free_vertices(layout, held.seen.excess_k.shape)
-    start = unheld(held.seen, before.seen, data, prior, free)
-    change = last_correction(data, prior, runs, start).excess_k[:, None, :] * free
-    warmer_k = layer_means(start.excess_k + change) - layer_means(held.seen.excess_k)
-    faces_m = layout.grid.faces_m(2)
-    heights_m = np.linspace(faces_m[0], faces_m[-1], len(warmer_k))
-    in_cells_k = np.interp(layout.grid.centres_m(2), heights_m, warmer_k)
-    layers_k = np.asarray(held.flow.mean.excess_k, float).mean((0, 1)) + in_cells_k
-    return layers_k if unknown_walls(prior) else layers_k.mean(keepdims=True)
-
-
-def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"]:
-    """Mean of a field at each height, side walls left out."""
-    return field[1:-1, 1:-1].mean((0, 1))
-
-
 def sentences(
     solved: Solved, residual: Float[np.ndarray, " data"], values: Float[np.ndarray, " data"]
 ) -> list[str]:
@@ -169,37 +111,12 @@ def left_unexplained(solved: Solved, seen: Prediction) -> float:
     return unexplained(solved.data, values - solved.data.predicted(seen), values)
 
 
-def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.ndarray, "vx vy vz"]:
-    """1 where a vertex is not on a wall of stated temperature."""
-    free = np.ones(shape)
-    for wall in np.flatnonzero(layout.held):
-        free[tuple((-1 if wall % 2 else 0) if a == wall // 2 else slice(None) for a in AXES)] = 0.0
-    return free
-
-
 def carried_m2_s2(
     problem: Problem, z_m: Float[np.ndarray, " vz"], warmer_k: Float[np.ndarray, "vx vy vz"]
 ) -> Float[np.ndarray, " vz"]:
     """Pressure over height that carries air which is warmer by this: dp/dz = g beta dT, its mean at each height."""
     buoyancy = GRAVITY_M_S2 * problem.scene.air.expansion_per_k * warmer_k.mean((0, 1))
     return cumulative_trapezoid(buoyancy, z_m, initial=0.0)
-
-
-def level_std_k(runs: list[Prediction]) -> float:
-    """How far what was stated leaves the level open: a room's temperature balances what nobody knows exactly."""
-    moved = [float((run.excess_k - runs[0].excess_k).mean()) for run in runs[1:]]
-    return float(np.linalg.norm(moved)) / DIFFERENCE
-
-
-def unknown_walls(prior: Prior) -> list[str]:
-    """Walls whose temperature is fitted."""
-    return [name for name, std in zip(WALLS, np.asarray(prior.std.wall_excess_k), strict=True) if std > 0]
-
-
-def departure(field: Float[np.ndarray, "vx vy vz"]) -> float:
-    """Rms of a field's departure from its profile of height, walls left out."""
-    field = field[1:-1, 1:-1, 1:-1]
-    return float(np.sqrt(np.mean((field - field.mean((0, 1))) ** 2)))
 
 
 def rms(field: Float[np.ndarray, "..."]) -> float:

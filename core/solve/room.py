@@ -14,8 +14,9 @@ from jaxtyping import Bool, Float
 
 from core.problem import Problem
 from core.result import Solution
-from core.room.answer import Solved, left_unexplained, solution, to_hold_k
+from core.room.answer import Solved, left_unexplained, solution
 from core.room.fit import Posterior, gauss_newton, weighted_variance
+from core.room.hold import to_hold_k
 from core.room.observe import Observations, Prediction, observations
 from core.room.plane_openings import with_plane_openings
 from core.room.prior import Prior, room_prior
