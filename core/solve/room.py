@@ -42,6 +42,8 @@ Vector = Float[np.ndarray, " active"]
 # it, the room may only not have settled yet; the one that is given back leaves no more than `_WORSE` of the least.
 # After so many rounds without a lesser misfit the derivatives have no more to say.
 _HARM, _WORSE, _PATIENCE = 1.5, 1.15, 2
+# A room that is held may leave so much more of the images than before, its own wobble; else it was held wrongly.
+_WOBBLE = 1.05
 
 
 class Begun(eqx.Module):
@@ -234,7 +236,7 @@ def held_fit(
         held = attempt(fine, before.parameters, held.flow.last, seconds, data.vertices, tell, held_k=held_k)
         left = misfit_ratio(data, held, before)
         tell({"held_s": seconds, "misfit_left": left})
-    return before if left > _WORSE else held
+    return before if left > _WOBBLE else held
 
 
 def supplied(layout: RoomLayout, best: Attempt) -> dict[str, float]:
