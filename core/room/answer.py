@@ -44,15 +44,13 @@ class Solved(eqx.Module):
 def solution(solved: Solved, seconds: float, *, use_images: bool, notes: tuple[str, ...] = ()) -> Solution:
     """The room as a result, with the temperature's last correction, deviations and sentences after `notes`."""
     best, box, problem = solved.best, solved.problem.scene.room, solved.problem
-    values, _, _ = solved.data.values()
-    residual = values - solved.data.predicted(best.seen)
     local_k = departure(best.seen.excess_k)
     free = free_vertices(solved.layout, best.seen.excess_k.shape)
     start = unheld(best.seen, solved.before.seen, solved.data, solved.prior, free)
     change = last_correction(solved.data, solved.prior, solved.runs, start)
     excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     variances = (change.prior_variance_k2[:, None, :] * free, change.variance_k2[:, None, :] * free)
-    share = unexplained(solved.data, residual, values)
+    share = unexplained(solved.data, best.seen)
     temperature = _deviation(solved, "excess_k", local_k, share, variances)
     pressure = _deviation(solved, "pressure_m2_s2", departure(best.seen.pressure_m2_s2), share)
     velocity = _deviation(solved, "velocity_m_s", rms(best.seen.velocity_m_s), share)
@@ -70,21 +68,19 @@ def solution(solved: Solved, seconds: float, *, use_images: bool, notes: tuple[s
         temperature.informed,
         outcome=best.flow.outcome,
         solver_s=seconds,
-        notes=(*notes, *sentences(solved, residual, values)),
+        notes=(*notes, *sentences(solved, share)),
     )
 
 
-def sentences(
-    solved: Solved, residual: Float[np.ndarray, " data"], values: Float[np.ndarray, " data"]
-) -> list[str]:
-    """Everything worth telling the operator."""
+def sentences(solved: Solved, share: float) -> list[str]:
+    """Everything worth telling the operator; `share` of the images is left unexplained."""
     parameters = solved.best.parameters
     inflow = np.asarray(solved.layout.inflow_m3_s(parameters), float)
     return [
         *solved.layout.notes,
         *undetermined(solved.problem),
         *contradictions(solved.problem, solved.prior, solved.posterior),
-        *misfit(solved.data, unexplained(solved.data, residual, values)),
+        *misfit(solved.data, share),
         *balances(parameters, inflow, solved.best.seen.outflow_excess_k, solved.problem, held_k_m3_s(solved)),
     ]
 
@@ -95,20 +91,14 @@ def held_k_m3_s(solved: Solved) -> float:
     return (solved.best.flow.held_k_s or 0.0) * float(np.prod(box.size_m))
 
 
-def unexplained(
-    data: Observations, residual: Float[np.ndarray, " data"], values: Float[np.ndarray, " data"]
-) -> float:
-    """Share (rms) of the measured shifts that the room does not explain."""
-    shifts = data.values()[2] == 0
+def unexplained(data: Observations, seen: Prediction) -> float:
+    """Share (rms) of the measured shifts that a room does not explain."""
+    values, _, group = data.values()
+    shifts = group == 0
     if not shifts.any():
         return _UNSEEN_SHARE
-    return float(np.linalg.norm(residual[shifts]) / max(float(np.linalg.norm(values[shifts])), 1e-30))
-
-
-def left_unexplained(solved: Solved, seen: Prediction) -> float:
-    """Share (rms) of the measured shifts that a room leaves."""
-    values, _, _ = solved.data.values()
-    return unexplained(solved.data, values - solved.data.predicted(seen), values)
+    left = (values - data.predicted(seen))[shifts]
+    return float(np.linalg.norm(left) / max(float(np.linalg.norm(values[shifts])), 1e-30))
 
 
 def carried_m2_s2(

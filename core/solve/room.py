@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 
 from core.problem import Problem
 from core.result import Solution
-from core.room.answer import Solved, left_unexplained, solution
+from core.room.answer import Solved, solution, unexplained
 from core.room.fit import Posterior, gauss_newton, weighted_variance
 from core.room.hold import to_hold_k
 from core.room.observe import Observations, Prediction, observations
@@ -105,7 +105,7 @@ def finish(
     name = promising_closure(solved, begun.coarse) if settings.use_images else None
     if name is not None:
         again = fitted_room(begin(problem, settings, tell, name), problem, settings, tell)
-        left = [left_unexplained(s, s.best.seen) for s in (solved, again)]
+        left = [unexplained(s.data, s.best.seen) for s in (solved, again)]
         if left[1] < left[0]:
             solved, notes = again, (another_closure(name, left[1], begun.coarse.closure, left[0]),)
     tell(supplied(solved.layout, solved.best))
@@ -116,7 +116,7 @@ def promising_closure(solved: Solved, coarse: Room) -> str | None:
     """The other closure if a coarse room under it leaves less of the images than the fitted one; None if stated."""
     if solved.problem.scene.flow.transport != "auto":
         return None
-    better = left_unexplained(solved, solved.other) < left_unexplained(solved, solved.best.seen)
+    better = unexplained(solved.data, solved.other) < unexplained(solved.data, solved.best.seen)
     return other_closure(coarse) if better else None
 
 
