@@ -3,7 +3,7 @@
 import re
 import shutil
 
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from app.client import Client
 from tests.browser.conftest import Opens, Station
@@ -60,6 +60,24 @@ def test_every_page_shows_a_refusal_in_the_services_words(station: Station, open
     shutil.rmtree(experiment.captures_folder)
     page.get_by_role("button", name="Discard", exact=True).click()
     told(page, "has no capture", "List the parent resource to see what there is.")
+
+
+def test_an_older_action_that_succeeds_leaves_a_newer_refusal_in_place(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        client.connect_camera(client.create_experiment(camera_px=64).experiment)
+    page = opens(station.address).page
+    expect(page.locator("footer")).to_contain_text("camera ready")
+    held: list[Route] = []
+    page.route("**/results", lambda route: held.append(route))
+    page.reload()
+    expect(page.locator("button.next")).to_contain_text("Opening")
+    page.get_by_label("Gain").fill("100")
+    page.get_by_role("button", name="Set", exact=True).click()
+    expect(page.get_by_role("alert")).to_contain_text("Gain 100 is not possible")
+    for route in held:
+        route.continue_()
+    expect(page.locator("footer")).to_contain_text("service connected")
+    told(page, "Gain 100 is not possible")
 
 
 def test_a_job_that_cannot_begin_says_why_in_the_queue(station: Station, opens: Opens):

@@ -50,12 +50,14 @@ class Bench {
     if (!this.stream) setTimeout(() => void this.start(), 2000);
   }
 
-  /** Runs an action; what goes wrong is shown in the service's own words until it is dismissed. */
+  /** Runs an action; what goes wrong is shown in the service's own words until it is dismissed, or until
+      an action that began after it succeeds. */
   async attempt<T>(what: string, action: () => Promise<T>): Promise<T | undefined> {
+    const before = this.problem;
     this.working = what;
     try {
       const outcome = await action();
-      this.problem = null;
+      if (this.problem === before) this.problem = null;
       return outcome;
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
