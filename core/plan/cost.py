@@ -77,7 +77,7 @@ def room_work(problem: Problem, flow: ExpectedFlow, settings: RoomSettings) -> W
     prior = room_prior(problem, coarse.layout)
     restarts = (1 + len(prior.active())) * settings.restart_s
     # Walls that nobody has stated move far: derivatives are made again, and corrections go on to the last.
-    far = bool(np.any(np.asarray(prior.std.wall_excess_k) > 0))
+    far = bool(prior.unknown_walls())
     rounds = settings.rounds if far else min(settings.rounds, _STATED_ROUNDS)
     # One coarse correction that is tried, and the second closure's run, beside the Jacobian's.
     coarse_s = settings.settle_s + (1 + far) * restarts + 2 * settings.restart_s

@@ -12,7 +12,7 @@ from core.room.fit import Posterior
 from core.room.hold import departure, free_vertices, last_correction, unheld
 from core.room.observe import Observations, Prediction
 from core.room.prior import Prior
-from core.room.runs import DIFFERENCE, Attempt
+from core.room.runs import Attempt, Derivatives
 from core.room.sentences import balances, contradictions, misfit, undetermined
 from core.room.setup import RoomLayout
 from core.uncertainty import Deviation, Represented, deviation
@@ -26,16 +26,18 @@ _SHARES = {"excess_k": (0.1, 1.0, 0.2), "pressure_m2_s2": (0.3, 2.0, 5.0), "velo
 class Solved(eqx.Module):
     """Everything that a solve leaves behind: what a solution and its deviations are made of.
 
-    `before` is the room that parameters alone make, `best` the same with its level, or profile, held.
+    `coarse`, `first` (the fine room) and `other` (another closure) share their parameters. `before` is the room
+    that fitted parameters alone make, `best` the same with its level, or profile, held.
     """
 
     problem: Problem
     data: Observations
     prior: Prior
     posterior: Posterior
-    runs: list[Prediction]
-    other: Prediction
+    derivatives: Derivatives
+    coarse: Prediction
     first: Prediction
+    other: Prediction
     before: Attempt
     best: Attempt
     layout: RoomLayout
@@ -47,7 +49,7 @@ def solution(solved: Solved, seconds: float, *, use_images: bool, notes: tuple[s
     local_k = departure(best.seen.excess_k)
     free = free_vertices(solved.layout, best.seen.excess_k.shape)
     start = unheld(best.seen, solved.before.seen, solved.data, solved.prior, free)
-    change = last_correction(solved.data, solved.prior, solved.runs, start)
+    change = last_correction(solved.data, solved.prior, solved.derivatives, start)
     excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     variances = (change.prior_variance_k2[:, None, :] * free, change.variance_k2[:, None, :] * free)
     share = unexplained(solved.data, best.seen)
@@ -121,9 +123,8 @@ def _deviation(
     share: float,
     extra: tuple[np.ndarray | float, np.ndarray | float] = (0.0, 0.0),
 ) -> Deviation:
-    start = getattr(solved.runs[0], name)
-    moved = [(getattr(run, name) - start) / DIFFERENCE for run in solved.runs[1:]]
-    between = [getattr(solved.first, name) - start, getattr(solved.other, name) - start]
+    moved = list(solved.derivatives.per_deviation(lambda run: getattr(run, name)))
+    between = [getattr(run, name) - getattr(solved.coarse, name) for run in (solved.first, solved.other)]
     if between[1].ndim == 3:
         # Closures pass walls' heat differently; the level that follows is measured.
         between[1] = between[1] - between[1].mean((0, 1))

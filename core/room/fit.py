@@ -12,9 +12,8 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-CORRELATED = 4.0
-# Errors of grid and closure reach over whole jets: the posterior counts that many times fewer data again.
-_COHERENT = 3.0
+# Neighbours err together, and errors of grid and closure reach over whole jets: so many data count as one.
+_COHERENT = 12.0
 _STUDENT_NU = 3.0
 _LONGEST_STEP = 3.0
 
@@ -52,7 +51,7 @@ def gauss_newton(
         new = vector + step
     data = normal - np.diag(prior)
     # A parameter that was let go is no more certain than its prior, were there no data; one near it no less.
-    return Posterior(new, np.linalg.inv(data / _COHERENT + np.eye(len(new))), np.sqrt(variance))
+    return Posterior(new, np.linalg.inv(data + np.eye(len(new))), np.sqrt(variance))
 
 
 def weighted_variance(
@@ -69,7 +68,7 @@ def weighted_variance(
     for g in np.unique(group):
         own = group == g
         error = min(spread(residual[own]), spread(grid_difference[own]))
-        total[own] = (variance[own] + error**2) * (CORRELATED if g <= 1 else 1.0)
+        total[own] = (variance[own] + error**2) * (_COHERENT if g <= 1 else 1.0)
     return total
 
 

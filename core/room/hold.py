@@ -8,18 +8,18 @@ room before: it is not asked for twice.
 import numpy as np
 from jaxtyping import Float
 
-from core.room.grid import AXES, WALLS
+from core.room.grid import AXES
 from core.room.observe import Observations, Prediction
 from core.room.prior import Prior
 from core.room.residue import Correction, temperature_correction
-from core.room.runs import DIFFERENCE, Attempt
+from core.room.runs import Attempt, Derivatives
 from core.room.setup import RoomLayout
 
 
 def to_hold_k(
     data: Observations,
     prior: Prior,
-    runs: list[Prediction],
+    derivatives: Derivatives,
     held: Attempt,
     before: Attempt,
     layout: RoomLayout,
@@ -30,13 +30,13 @@ def to_hold_k(
     """
     free = free_vertices(layout, held.seen.excess_k.shape)
     start = unheld(held.seen, before.seen, data, prior, free)
-    change = last_correction(data, prior, runs, start).excess_k[:, None, :] * free
+    change = last_correction(data, prior, derivatives, start).excess_k[:, None, :] * free
     warmer_k = layer_means(start.excess_k + change) - layer_means(held.seen.excess_k)
     faces_m = layout.grid.faces_m(2)
     heights_m = np.linspace(faces_m[0], faces_m[-1], len(warmer_k))
     in_cells_k = np.interp(layout.grid.centres_m(2), heights_m, warmer_k)
     layers_k = np.asarray(held.flow.mean.excess_k, float).mean((0, 1)) + in_cells_k
-    return layers_k if unknown_walls(prior) else layers_k.mean(keepdims=True)
+    return layers_k if prior.unknown_walls() else layers_k.mean(keepdims=True)
 
 
 def unheld(
@@ -48,7 +48,7 @@ def unheld(
 ) -> Prediction:
     """A room that was held, at the level (or profile) it had before: a correction is of what the model says."""
     shift_k = layer_means(held.excess_k) - layer_means(before.excess_k)
-    if not unknown_walls(prior):
+    if not prior.unknown_walls():
         shift_k = np.full_like(shift_k, shift_k.mean())
     outflow_k, box = held.outflow_excess_k, data.scene.room
     for outlet in data.outlets:
@@ -60,12 +60,14 @@ def unheld(
     return Prediction(held.excess_k - shift_k * free, held.pressure_m2_s2, held.velocity_m_s, outflow_k)
 
 
-def last_correction(data: Observations, prior: Prior, runs: list[Prediction], seen: Prediction) -> Correction:
+def last_correction(
+    data: Observations, prior: Prior, derivatives: Derivatives, seen: Prediction
+) -> Correction:
     """The correction of T by all that parameters leave unexplained."""
     own_k = departure(seen.excess_k)
-    level_k = max(own_k, level_std_k(runs))
+    level_k = max(own_k, level_std_k(derivatives))
     residual = data.values()[0] - data.predicted(seen)
-    return temperature_correction(data, seen.excess_k, residual, own_k, level_k, unknown_walls(prior))
+    return temperature_correction(data, seen.excess_k, residual, own_k, level_k, prior.unknown_walls())
 
 
 def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"]:
@@ -81,15 +83,9 @@ def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.n
     return free
 
 
-def level_std_k(runs: list[Prediction]) -> float:
+def level_std_k(derivatives: Derivatives) -> float:
     """How far what was stated leaves the level open: a room's temperature balances what nobody knows exactly."""
-    moved = [float((run.excess_k - runs[0].excess_k).mean()) for run in runs[1:]]
-    return float(np.linalg.norm(moved)) / DIFFERENCE
-
-
-def unknown_walls(prior: Prior) -> list[str]:
-    """Walls whose temperature is fitted."""
-    return [name for name, std in zip(WALLS, np.asarray(prior.std.wall_excess_k), strict=True) if std > 0]
+    return float(np.linalg.norm(derivatives.per_deviation(lambda run: run.excess_k.mean())))
 
 
 def departure(field: Float[np.ndarray, "vx vy vz"]) -> float:

@@ -32,6 +32,10 @@ _HEATER_HEAT_M_S, _HEATER_HEAT_STD = 2.5e-3, 0.5
 # A viscosity that the images may choose absorbs every other misfit and spoils u: k-epsilon keeps its own.
 _CLOSURE_STD, _SIMPLE_CLOSURE_STD = 0.12, 0.25
 _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
+# Where walls are unknown their temperatures and their common heat coefficient are much the same freedom.
+WALL_PARAMETERS = ("wall_excess_k", "log_heat")
+# Walls that a view looks through, and onto.
+_NEAR, _FAR = WALLS.index("y_min"), WALLS.index("y_max")
 
 
 class Prior(eqx.Module):
@@ -48,7 +52,19 @@ class Prior(eqx.Module):
 
     def active(self) -> np.ndarray:
         """Indices of the fitted parameters in the flattened vector."""
-        return np.flatnonzero(np.asarray(ravel_pytree(self.std)[0]) > 0)
+        std = self.std
+        if self.alike():
+            std = eqx.tree_at(lambda p: p.wall_excess_k, std, std.wall_excess_k.at[_FAR].set(0.0))
+        return np.flatnonzero(np.asarray(ravel_pytree(std)[0]) > 0)
+
+    def unknown_walls(self) -> list[str]:
+        """Walls whose temperature is fitted."""
+        spread_k = np.asarray(self.std.wall_excess_k)
+        return [name for name, std_k in zip(WALLS, spread_k, strict=True) if std_k > 0]
+
+    def alike(self) -> bool:
+        """Whether the walls before and behind the air are fitted as one: rays through both tell them not apart."""
+        return {WALLS[_NEAR], WALLS[_FAR]} <= set(self.unknown_walls())
 
     def parameters(self, vector: Float[np.ndarray, " active"]) -> RoomParameters:
         """Parameters from fitted ones in units of their deviations from the mean."""
@@ -58,6 +74,9 @@ class Prior(eqx.Module):
         flat = np.asarray(mean, float).copy()
         flat[chosen] += vector * std[chosen]
         found = restore(jnp.asarray(flat, mean.dtype))
+        if self.alike():
+            walls = found.wall_excess_k.at[_FAR].set(found.wall_excess_k[_NEAR])
+            found = eqx.tree_at(lambda p: p.wall_excess_k, found, walls)
         moved = found.wall_log_heat + self._balanced(found)
         return eqx.tree_at(lambda p: p.wall_log_heat, found, moved)
 
@@ -81,8 +100,9 @@ class Prior(eqx.Module):
         return [named[n] for n in self.active()]
 
     def firm(self) -> Bool[np.ndarray, " active"]:
-        """Which fitted parameters describe the closure: nobody entered them, so nobody did so wrongly."""
-        return np.array([name.startswith(("log_closure", "log_viscosity")) for name in self.names()], bool)
+        """Which fitted parameters nobody entered, so that nobody did so wrongly: the closure, unknown walls."""
+        own = ("log_closure", "log_viscosity", *(WALL_PARAMETERS if self.unknown_walls() else ()))
+        return np.array([name.startswith(own) for name in self.names()], bool)
 
 
 def room_prior(

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import ArrayLike, Float
 
 from core.problem import Problem
 from core.room.boundary import set_normal
@@ -14,7 +14,7 @@ from core.room.march import March, MarchSettings, march
 from core.room.model import Flow
 from core.room.observe import Prediction
 from core.room.plane_openings import air_planes, still_vertices
-from core.room.prior import Prior, outflow_excess_k
+from core.room.prior import WALL_PARAMETERS, Prior, outflow_excess_k
 from core.room.room import Room, room, seen
 from core.room.setup import RoomParameters
 from core.scene import Inlet
@@ -24,7 +24,9 @@ Event = Callable[[dict[str, float]], object]
 
 # Steps of the finite differences, in prior deviations: beyond the march's own wobble, short of curvature. At
 # half a deviation the wobble outweighs what 1 % of a supply does, and the fit of a wrong supply does not end.
-DIFFERENCE = 2.0
+# Walls that nobody knows may be off by half the supply's excess, and jets swerve: two deviations to one side
+# point where 0.25 do to 0.34-0.66 (cosine, shifts of case A), half of one to 0.77-0.94.
+_DIFFERENCE, _WALLS_DIFFERENCE = 2.0, 0.3
 
 # Steps a cell of the room's edge and second of the reference room, which takes half as many: a room whose
 # air turns out far faster than what was stated about it must not take hours.
@@ -40,7 +42,8 @@ class RoomSettings:
 
     The coarse room is corrected while a parameter moves by more than `coarse_step` prior deviations and
     the misfit falls below `worthwhile` of what it was: a coarse grid's own error must not move the rest.
-    A Jacobian serves for `straight` prior deviations. The fine room's rounds end with a step below
+    A Jacobian serves for `straight` prior deviations; where walls are unknown the fine room's is made again up
+    to `again` times, once parameters moved by `straight_walls`. The fine room's rounds end with a step below
     `fine_step`; the longest march, `final_s`, follows. `wall_heat` multiplies what the balance, or the usual
     guess, gives for the walls' heat coefficient.
     """
@@ -53,6 +56,8 @@ class RoomSettings:
     coarse_step: float = 1.0
     worthwhile: float = 0.85
     straight: float = 4.0
+    straight_walls: float = 1.5
+    again: int = 2
     fine_step: float = 0.3
     settle_s: float = 150.0
     restart_s: float = 60.0
@@ -73,6 +78,22 @@ class Attempt(eqx.Module):
     parameters: RoomParameters
     flow: March
     seen: Prediction
+
+
+class Derivatives(eqx.Module):
+    """A room as it is, and with one parameter after the other moved by `steps` prior deviations."""
+
+    start: Prediction
+    moved: list[Prediction]
+    steps: Float[np.ndarray, " active"]
+
+    def per_deviation(self, read: Callable[[Prediction], ArrayLike]) -> Float[np.ndarray, "active ..."]:
+        """Change of what `read` takes from a room, per prior deviation of each parameter."""
+        before = np.asarray(read(self.start))
+        changes = [
+            (np.asarray(read(run)) - before) / step for run, step in zip(self.moved, self.steps, strict=True)
+        ]
+        return np.stack(changes) if changes else np.zeros((0, *before.shape))
 
 
 def settled(
@@ -142,9 +163,9 @@ def perturbed(
     base: Attempt,
     settings: RoomSettings,
     vertices: tuple[int, int, int],
-) -> list[Prediction]:
+) -> Derivatives:
     """The settled room again, first as it is and then with one parameter moved after the other."""
-    steps = [np.zeros(len(prior.active())), *(np.eye(len(prior.active())) * DIFFERENCE)]
+    sizes = differences(prior)
 
     def one(step: Float[np.ndarray, " active"]) -> Prediction:
         quiet: Event = lambda _: None  # noqa: E731
@@ -153,7 +174,14 @@ def perturbed(
         ).seen
 
     with ThreadPoolExecutor(settings.threads) as pool:
-        return list(pool.map(one, steps))
+        start, *moved = pool.map(one, [np.zeros(len(sizes)), *np.diag(sizes)])
+    return Derivatives(start, moved, sizes)
+
+
+def differences(prior: Prior) -> Float[np.ndarray, " active"]:
+    """By how many prior deviations each parameter is moved to see what it does."""
+    walls = [bool(prior.unknown_walls()) and name.startswith(WALL_PARAMETERS) for name in prior.names()]
+    return np.where(walls, _WALLS_DIFFERENCE, _DIFFERENCE)
 
 
 def other_closure(where: Room) -> str:

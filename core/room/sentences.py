@@ -124,8 +124,13 @@ def undetermined(problem: Problem) -> list[str]:
         ]
     unknown = [name for name, wall in walls.items() if wall is None or wall.thermal == "unknown"]
     if unknown:
+        alike = (
+            " (y_min and y_max as one: the camera looks through both)"
+            if {"y_min", "y_max"} <= set(unknown)
+            else ""
+        )
         return [
-            f"What passes through {', '.join(unknown)} is not stated and was fitted to the measurements. "
+            f"What passes through {', '.join(unknown)} is not stated and was fitted to the measurements{alike}. "
             "Velocity hinges on it: a stated wall temperature, or 'adiabatic', is worth more than more frames."
         ]
     return []

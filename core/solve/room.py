@@ -7,6 +7,7 @@ the closure cannot represent, from the differences of two grids and of two closu
 """
 
 import time
+from collections.abc import Callable
 
 import equinox as eqx
 import numpy as np
@@ -17,13 +18,13 @@ from core.result import Solution
 from core.room.answer import Solved, solution, unexplained
 from core.room.fit import Posterior, gauss_newton, weighted_variance
 from core.room.hold import to_hold_k
-from core.room.observe import Observations, Prediction, observations
+from core.room.observe import Observations, observations
 from core.room.plane_openings import with_plane_openings
 from core.room.prior import Prior, room_prior
 from core.room.room import Room, carried_over, room
 from core.room.runs import (
-    DIFFERENCE,
     Attempt,
+    Derivatives,
     Event,
     RoomSettings,
     attempt,
@@ -39,11 +40,9 @@ from core.scene import Scene
 Vector = Float[np.ndarray, " active"]
 
 # A correction that leaves more than this of the least misfit so far did harm: the room before it is kept. Below
-# it, the room may only not have settled yet; the one that is given back leaves no more than `_WORSE` of the least.
-# After so many rounds without a lesser misfit the derivatives have no more to say.
-_HARM, _WORSE, _PATIENCE = 1.5, 1.15, 2
-# A room that is held may leave so much more of the images than before, its own wobble; else it was held wrongly.
-_WOBBLE = 1.05
+# it, the room may only not have settled yet; what is given back leaves no more than its own wobble above the least.
+# After so many rounds that take less than a hundredth off the misfit the derivatives have no more to say.
+_HARM, _GAIN, _PATIENCE, _WOBBLE = 1.5, 0.99, 2, 1.05
 
 
 class Begun(eqx.Module):
@@ -55,7 +54,7 @@ class Begun(eqx.Module):
     prior: Prior
     base: Attempt
     first: Attempt
-    jacobian: list[Prediction]
+    derivatives: Derivatives
 
 
 def solve_room(
@@ -86,10 +85,10 @@ def begin(problem: Problem, settings: RoomSettings, tell: Event, closure: str | 
     base = settled(coarse, prior, problem, settings, vertices, tell)
     flow = carried_over(base.flow.last, coarse.grid, fine.grid)
     first = attempt(fine, prior.mean, flow, settings.refine_s, vertices, tell)
-    jacobian = perturbed(coarse, prior, np.zeros(len(prior.active())), base, settings, vertices)
+    derivatives = perturbed(coarse, prior, np.zeros(len(prior.active())), base, settings, vertices)
     # As it looks after having settled for as long again.
-    base = Attempt(base.parameters, base.flow, jacobian[0])
-    return Begun(problem, coarse, fine, prior, base, first, jacobian)
+    base = Attempt(base.parameters, base.flow, derivatives.start)
+    return Begun(problem, coarse, fine, prior, base, first, derivatives)
 
 
 def finish(
@@ -127,36 +126,54 @@ def fitted_room(begun: Begun, problem: Problem, settings: RoomSettings, tell: Ev
     problem = Problem(stated.scene, problem.shifts, stated.planes, stated.sensors)
     vertices = (settings.vertices, settings.vertices, settings.vertices)
     data = observations(problem, vertices)
-    vector, base, jacobian = coarse_fit(begun, data, settings, tell)
+    vector, base, linearised = coarse_fit(begun, data, settings, tell)
     other = otherwise_closed(coarse, prior.parameters(vector), base, settings, vertices)
     first = begun.first
     seconds = settings.refine_s + (0.0 if settings.use_images else settings.final_s)
     if np.any(vector) or not settings.use_images:
         first = attempt(fine, prior.parameters(vector), first.flow.last, seconds, vertices, tell)
-    posterior, before = fine_fit(fine, prior, data, vector, first, jacobian, settings, tell)
-    best = before
+
+    def made_again(where: Vector) -> Derivatives:
+        return perturbed(coarse, prior, where, base, settings, vertices)
+
+    found, derivatives = fine_fit(fine, prior, data, vector, first, linearised, made_again, settings, tell)
+    before = best = found.room
     if settings.use_images:
-        best = held_fit(fine, prior, data, before, jacobian, settings, tell)
-    return Solved(problem, data, prior, posterior, jacobian, other, first.seen, before, best, fine.layout)
+        best = held_fit(fine, prior, data, before, derivatives, settings, tell)
+    return Solved(
+        problem,
+        data,
+        prior,
+        found.posterior,
+        derivatives,
+        coarse=linearised.start,
+        first=first.seen,
+        other=other,
+        before=before,
+        best=best,
+        layout=fine.layout,
+    )
 
 
 def coarse_fit(
     begun: Begun, data: Observations, settings: RoomSettings, tell: Event
-) -> tuple[Vector, Attempt, list[Prediction]]:
+) -> tuple[Vector, Attempt, Derivatives]:
     """Parameters that the coarse room asks for, the room under them, and the runs of its Jacobian.
 
     What the coarse grid gets wrong is taken from the fine one under the stated parameters, so that it moves none.
     Far from where it was made a Jacobian misleads: it is made anew after every `settings.straight` prior deviations.
+    Walls that nobody knows are left to the fine room: the coarse one's own errors would move them.
     """
-    coarse, prior, base, jacobian = begun.coarse, begun.prior, begun.base, begun.jacobian
+    coarse, prior, base, derivatives = begun.coarse, begun.prior, begun.base, begun.derivatives
     vector = linearised = np.zeros(len(prior.active()))
     finer = data.predicted(begun.first.seen) - data.predicted(base.seen)
-    for n in range(settings.coarse_rounds if settings.use_images else 0):
+    far = not settings.use_images or bool(prior.unknown_walls())
+    for n in range(0 if far else settings.coarse_rounds):
         # Where the parameters have moved, half of what was taken off may be wrong.
         new = corrected(
-            vector, base, data, jacobian, 0.5 * finer, firm=prior.firm(), offset=finer, trusting=True
+            vector, base, data, derivatives, 0.5 * finer, firm=prior.firm(), offset=finer, trusting=True
         ).vector
-        if float(np.abs(new - vector).max(initial=0.0)) < settings.coarse_step:
+        if farthest(new, vector) < settings.coarse_step:
             break
         where, seconds = prior.parameters(new), settings.restart_s
         tried = attempt(coarse, where, base.flow.last, seconds, data.vertices, tell)
@@ -165,11 +182,23 @@ def coarse_fit(
         if left > settings.worthwhile:
             break
         vector, base = new, tried
-        if float(np.abs(vector - linearised).max()) > settings.straight:
-            jacobian, linearised = perturbed(coarse, prior, vector, base, settings, data.vertices), vector
+        if farthest(vector, linearised) > settings.straight:
+            derivatives, linearised = perturbed(coarse, prior, vector, base, settings, data.vertices), vector
     if np.any(vector != linearised):
-        jacobian = perturbed(coarse, prior, vector, base, settings, data.vertices)
-    return vector, base, jacobian
+        derivatives = perturbed(coarse, prior, vector, base, settings, data.vertices)
+    return vector, base, derivatives
+
+
+class Fit(eqx.Module):
+    """Parameters that a fine room was marched under, what data leave open of them, and that room."""
+
+    posterior: Posterior
+    room: Attempt
+
+    def known_as(self, other: "Fit") -> "Fit":
+        """The same room, with what data leave open by another's."""
+        known = other.posterior
+        return Fit(Posterior(self.posterior.vector, known.covariance, known.deviation), self.room)
 
 
 def fine_fit(
@@ -178,43 +207,68 @@ def fine_fit(
     data: Observations,
     vector: Vector,
     first: Attempt,
-    jacobian: list[Prediction],
+    derivatives: Derivatives,
+    made_again: Callable[[Vector], Derivatives],
     settings: RoomSettings,
     tell: Event,
-) -> tuple[Posterior, Attempt]:
-    """The fine room's parameters and the best of its marches; as stated where images are not to be used."""
-    best = least = first
-    posterior = at_least = Posterior(vector, np.eye(len(vector)), np.zeros(0))
-    grid_difference = data.predicted(first.seen) - data.predicted(jacobian[0])
+) -> tuple[Fit, Derivatives]:
+    """The fine room's parameters and best march, and the last derivatives; as stated without images.
 
-    def marched(towards: Posterior, name: float) -> tuple[Attempt, float]:
-        where, seconds = prior.parameters(towards.vector), settings.refine_s
-        tried = attempt(fine, where, best.flow.last, seconds, data.vertices, tell)
-        left = misfit_ratio(data, tried, least)
-        tell({"round": name, "misfit_left": left, **fitted(prior, towards.vector)})
-        return tried, left
-
-    stale = 0
+    Where walls are unknown those are `made_again` after every other round that moved far, `settings.again` times.
+    """
+    best = least = Fit(Posterior(vector, np.eye(len(vector)), np.zeros(0)), first)
+    grid_difference = data.predicted(first.seen) - data.predicted(derivatives.start)
+    stale, again, linearised = 0, settings.again if prior.unknown_walls() else 0, vector
     for n in range(settings.rounds if settings.use_images else 0):
-        new = corrected(posterior.vector, best, data, jacobian, grid_difference, firm=prior.firm())
-        step = float(np.abs(new.vector - posterior.vector).max(initial=0.0))
-        tried, left = marched(new, n + 1.0)
+        new, left = fine_round(
+            n, fine, prior, data, best, least, derivatives, grid_difference, settings, tell
+        )
         if left > _HARM:
-            # Half of a step that did harm: the derivatives are a coarser room's.
-            new = Posterior(0.5 * (posterior.vector + new.vector), new.covariance, new.deviation)
-            tried, left = marched(new, n + 1.5)
-        if left > _HARM:
-            posterior = Posterior(posterior.vector, new.covariance, new.deviation)
+            best = best.known_as(new)
             break
-        posterior, best = new, tried
-        stale = 0 if left < 1.0 else stale + 1
-        if left < 1.0:
-            at_least, least = new, tried
-        if step < settings.fine_step or stale == _PATIENCE:
+        step = farthest(new.posterior.vector, best.posterior.vector)
+        best, stale = new, 0 if left < _GAIN else stale + 1
+        least = new if left < 1.0 else least
+        if again > 0 and n % 2 == 1 and farthest(new.posterior.vector, linearised) > settings.straight_walls:
+            again, linearised, stale = again - 1, new.posterior.vector, 0
+            derivatives = made_again(linearised)
+        elif step < settings.fine_step or stale == _PATIENCE:
             break
-    if misfit_ratio(data, best, least) > _WORSE:
-        return Posterior(at_least.vector, posterior.covariance, posterior.deviation), least
-    return posterior, best
+    if misfit_ratio(data, best.room, least.room) > _WOBBLE:
+        best = least.known_as(best)
+    return best, derivatives
+
+
+def fine_round(
+    n: int,
+    fine: Room,
+    prior: Prior,
+    data: Observations,
+    best: Fit,
+    least: Fit,
+    derivatives: Derivatives,
+    grid_difference: Float[np.ndarray, " data"],
+    settings: RoomSettings,
+    tell: Event,
+) -> tuple[Fit, float]:
+    """One step from the best room and its march, half of it where all did harm; its misfit over the least one.
+
+    The derivatives are a coarser room's, so a step may be too long.
+    """
+    asked = corrected(best.posterior.vector, best.room, data, derivatives, grid_difference, firm=prior.firm())
+    new, left = best, np.inf
+    for share in (1.0, 0.5):
+        vector = best.posterior.vector + share * (asked.vector - best.posterior.vector)
+        flow = best.room.flow.last
+        tried = attempt(fine, prior.parameters(vector), flow, settings.refine_s, data.vertices, tell)
+        new, left = (
+            Fit(Posterior(vector, asked.covariance, asked.deviation), tried),
+            misfit_ratio(data, tried, least.room),
+        )
+        tell({"round": n + 2.0 - share, "misfit_left": left, **fitted(prior, vector)})
+        if left <= _HARM:
+            break
+    return new, left
 
 
 def held_fit(
@@ -222,7 +276,7 @@ def held_fit(
     prior: Prior,
     data: Observations,
     before: Attempt,
-    runs: list[Prediction],
+    derivatives: Derivatives,
     settings: RoomSettings,
     tell: Event,
 ) -> Attempt:
@@ -232,7 +286,7 @@ def held_fit(
     """
     held, left = before, 1.0
     for seconds in (settings.refine_s, settings.final_s):
-        held_k = to_hold_k(data, prior, runs, held, before, fine.layout)
+        held_k = to_hold_k(data, prior, derivatives, held, before, fine.layout)
         held = attempt(fine, before.parameters, held.flow.last, seconds, data.vertices, tell, held_k=held_k)
         left = misfit_ratio(data, held, before)
         tell({"held_s": seconds, "misfit_left": left})
@@ -261,7 +315,7 @@ def corrected(
     vector: Vector,
     best: Attempt,
     data: Observations,
-    runs: list[Prediction],
+    derivatives: Derivatives,
     grid_difference: Float[np.ndarray, " data"],
     *,
     firm: Bool[np.ndarray, " active"],
@@ -270,8 +324,7 @@ def corrected(
 ) -> Posterior:
     """One Gauss-Newton step from `vector` by the misfit of `best`, `offset` added to what it shows."""
     values, variance, group = data.values()
-    start = data.predicted(runs[0])
-    jacobian = np.stack([(data.predicted(run) - start) / DIFFERENCE for run in runs[1:]], axis=1)
+    jacobian = derivatives.per_deviation(data.predicted).T
     residual = values - data.predicted(best.seen) - offset
     weights = weighted_variance(variance, group, residual, grid_difference)
     return gauss_newton(vector, residual, weights, jacobian, firm, trusting=trusting)
@@ -285,6 +338,11 @@ def misfit_ratio(
     after, before = (values - data.predicted(a.seen) - offset for a in (new, old))
     weights = weighted_variance(variance, group, before, before)
     return float(np.sqrt(np.sum(after**2 / weights) / max(np.sum(before**2 / weights), 1e-30)))
+
+
+def farthest(one: Vector, other: Vector) -> float:
+    """The largest difference of two sets of parameters, in prior deviations."""
+    return float(np.abs(one - other).max(initial=0.0))
 
 
 def fitted(prior: Prior, vector: Vector) -> dict[str, float]:
