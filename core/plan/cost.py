@@ -27,8 +27,8 @@ from core.solve.room import closure_name
 
 # Iterations of `draft` without a plane over those with one: 55 over 35, median of six rooms.
 _FREE_PROFILE = 1.5
-# Corrections of a fine room whose walls are stated, before a step is too small to matter.
-_STATED_ROUNDS = 3
+# Corrections of a fine room before none gains any more, its walls stated or not.
+_STATED_ROUNDS, _UNKNOWN_ROUNDS = 3, 6
 
 # As `airlens simulate --information` names them; `images`: not even a plane.
 Level = Literal["surveyed", "operator", "paper", "images"]
@@ -76,11 +76,11 @@ def room_work(problem: Problem, flow: ExpectedFlow, settings: RoomSettings) -> W
     fine = room(scene, settings.cells, closure_name(scene))
     prior = room_prior(problem, coarse.layout)
     restarts = (1 + len(prior.active())) * settings.restart_s
-    # Walls that nobody has stated move far: derivatives are made again, and corrections go on to the last.
+    # Walls that nobody has stated move far: derivatives are made again, and corrections go on.
     far = bool(prior.unknown_walls())
-    rounds = settings.rounds if far else min(settings.rounds, _STATED_ROUNDS)
+    rounds = min(settings.rounds, _UNKNOWN_ROUNDS if far else _STATED_ROUNDS)
     # One coarse correction that is tried, and the second closure's run, beside the Jacobian's.
-    coarse_s = settings.settle_s + (1 + far) * restarts + 2 * settings.restart_s
+    coarse_s = settings.settle_s + (1 + settings.again * far) * restarts + 2 * settings.restart_s
     # The room as stated, each round, and two marches that are held.
     fine_s = (2 + rounds) * settings.refine_s + settings.final_s
     steps = flow.pace / flow.step_s * flow.cell_m
