@@ -11,15 +11,13 @@ from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.result import Solution
 from core.room.observe import observations
+from core.room.rounds import coarse_fit, fine_fit, misfit_ratio
 from core.room.runs import Derivatives
 from core.scene import FixedTexture, FlowModel, Inlet, Outlet, Patch, Scene, View, Wall
 from core.solve.room import (
     RoomSettings,
     begin,
-    coarse_fit,
-    fine_fit,
     fitted_room,
-    misfit_ratio,
     promising_closure,
     solve_room,
 )
