@@ -4,7 +4,7 @@ The seed changes only the shifts: the coarse room that is marched as stated, and
 all seeds of a room and a level of information. One JSON line each, with the errors beside it.
 
     python -m tests.benchmarks.coverage A.npz C.npz --seeds 0 --cells 48 --coarse 32
-    python -m tests.benchmarks.coverage A.npz C.npz --seeds 1 2 3 4 --cells 32 --coarse 24
+    python -m tests.benchmarks.coverage A.npz C.npz --seeds 0 1 2 3 4
 """
 
 import argparse
