@@ -34,8 +34,9 @@ _CLOSURE_STD, _SIMPLE_CLOSURE_STD = 0.12, 0.25
 _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
 # Where walls are unknown their temperatures and their common heat coefficient are much the same freedom.
 WALL_PARAMETERS = ("wall_excess_k", "log_heat")
-# Walls that a view looks through, and onto.
-_NEAR, _FAR = WALLS.index("y_min"), WALLS.index("y_max")
+# Walls that a view looks through, and onto: where both are unknown they are fitted as one.
+FITTED_AS_ONE = ("y_min", "y_max")
+_NEAR, _FAR = (WALLS.index(name) for name in FITTED_AS_ONE)
 
 
 class Prior(eqx.Module):
@@ -64,7 +65,7 @@ class Prior(eqx.Module):
 
     def alike(self) -> bool:
         """Whether the walls before and behind the air are fitted as one: rays through both tell them not apart."""
-        return {WALLS[_NEAR], WALLS[_FAR]} <= set(self.unknown_walls())
+        return set(FITTED_AS_ONE) <= set(self.unknown_walls())
 
     def parameters(self, vector: Float[np.ndarray, " active"]) -> RoomParameters:
         """Parameters from fitted ones in units of their deviations from the mean."""

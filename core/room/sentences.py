@@ -7,7 +7,7 @@ from core.problem import Problem
 from core.room.fit import Posterior
 from core.room.observe import Observations
 from core.room.openings import stated_walls
-from core.room.prior import Prior
+from core.room.prior import FITTED_AS_ONE, Prior
 from core.room.setup import RoomParameters
 from core.scene import Heater, Inlet
 
@@ -126,7 +126,7 @@ def undetermined(problem: Problem) -> list[str]:
     if unknown:
         alike = (
             " (y_min and y_max as one: the camera looks through both)"
-            if {"y_min", "y_max"} <= set(unknown)
+            if set(FITTED_AS_ONE) <= set(unknown)
             else ""
         )
         return [

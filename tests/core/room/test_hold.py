@@ -7,6 +7,7 @@ import pytest
 
 from core.geometry import Box, looking_along_y
 from core.problem import Problem
+from core.room.grid import WALLS
 from core.room.hold import unheld
 from core.room.observe import Prediction, observations
 from core.room.prior import Prior, room_prior
@@ -14,7 +15,6 @@ from core.room.room import room
 from core.room.sentences import balances
 from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, View, Wall
 
-WALLS = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 VERTICES = (9, 8, 7)
 
 

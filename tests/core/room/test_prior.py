@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from core.problem import Problem
+from core.room.grid import WALLS
 from core.room.observe import Prediction
 from core.room.runs import Derivatives, differences
 from core.room.sentences import undetermined
 from core.scene import Wall
-from tests.core.room.test_hold import VERTICES, WALLS, prior_of, problem
+from tests.core.room.test_hold import VERTICES, prior_of, problem
 
 
 def with_walls(**kelvin: float) -> Problem:
