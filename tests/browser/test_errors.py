@@ -80,6 +80,24 @@ def test_an_older_action_that_succeeds_leaves_a_newer_refusal_in_place(station: 
     told(page, "Gain 100 is not possible")
 
 
+def test_the_board_s_form_waits_for_the_board_that_is_known(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=64).experiment
+    page = opens(station.address).page
+    held: list[Route] = []
+    page.route(f"**/experiments/{name}", lambda route: held.append(route))
+    go_to(page, "Calibrate")
+    expect(page.locator("#guide-title")).to_be_visible()
+    expect(page.get_by_role("button", name="1. camera")).to_be_visible()
+    expect(page.locator("details.board")).to_have_count(0)
+    for route in held:
+        route.continue_()
+    page.locator("details.board summary").click()
+    expect(page.get_by_label("Kind")).to_be_visible()
+    page.get_by_label("Kind").select_option("charuco")
+    page.get_by_label("Side of a marker [mm]").fill("20")
+
+
 def test_a_job_that_cannot_begin_says_why_in_the_queue(station: Station, opens: Opens):
     with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
         name = client.create_experiment(camera_px=64).experiment

@@ -52,7 +52,7 @@ class Attempts:
         return subprocess.Popen(command, cwd=ROOT, env=self._environment)
 
     def kept(self) -> list[Path]:
-        return sorted(self.folder.attempt(self.number).glob("checkpoint/*.checkpoint"))
+        return sorted(self.folder.attempt(self.number).glob("checkpoint/[0-9]*.checkpoint"))
 
     def wait_for_a_checkpoint(self, process: subprocess.Popen) -> None:
         deadline = time.monotonic() + 200
