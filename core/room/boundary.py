@@ -19,7 +19,7 @@ class WallPlane(eqx.Module):
 
     `conductance_m_s` is the kinematic heat coefficient q / (rho c dT) over the face, `wall_excess_k` the
     conductance-weighted mean temperature behind it; `grip` is 1 for no-slip and 0 for a free surface;
-    `held` is 1 where the wall's own temperature is known, and shown on its vertices;
+    `held` is the share of the face whose own temperature is known, and shown on its vertices;
     `turbulent_energy_m2_s2` and `dissipation_m2_s3` are those of inflowing air.
     """
 
@@ -32,7 +32,7 @@ class WallPlane(eqx.Module):
     turbulent_energy_m2_s2: Plane
     dissipation_m2_s3: Plane
     grip: Float[Array, ""]
-    held: Float[Array, ""]
+    held: Plane
 
 
 class Boundary(eqx.Module):
@@ -44,9 +44,7 @@ class Boundary(eqx.Module):
 def closed_wall(grid: RoomGrid, axis: int, grip: float = 1.0) -> WallPlane:
     """A wall at rest that no heat passes."""
     zero = jnp.zeros(grid.plane(axis), jnp.float32)
-    return WallPlane(
-        zero, (zero, zero), zero, zero, zero, zero, zero, zero, jnp.float32(grip), jnp.float32(1.0)
-    )
+    return WallPlane(zero, (zero, zero), zero, zero, zero, zero, zero, zero, jnp.float32(grip), zero + 1.0)
 
 
 def closed_room(grid: RoomGrid, grip: float = 1.0) -> Boundary:

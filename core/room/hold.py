@@ -14,6 +14,7 @@ from core.room.prior import Prior
 from core.room.residue import Correction, temperature_correction
 from core.room.runs import Attempt, Derivatives
 from core.room.setup import RoomLayout
+from core.room.vertices import cell_matrix
 
 
 def to_hold_k(
@@ -76,11 +77,18 @@ def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"
 
 
 def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.ndarray, "vx vy vz"]:
-    """1 where a vertex is not on a wall of stated temperature."""
+    """1 where a vertex is not on a wall, or heater, of stated temperature."""
     free = np.ones(shape)
     for wall in np.flatnonzero(layout.held):
-        free[tuple((-1 if wall % 2 else 0) if a == wall // 2 else slice(None) for a in AXES)] = 0.0
+        free[_plane(wall)] = 0.0
+    for heater in layout.heaters:
+        first, second = (cell_matrix(layout.grid, a, shape[a]) for a in AXES if a != heater.axis)
+        free[_plane(heater.wall)] *= 1.0 - first @ np.pad(heater.fraction, 1) @ second.T
     return free
+
+
+def _plane(wall: int) -> tuple[slice | int, ...]:
+    return tuple((-1 if wall % 2 else 0) if a == wall // 2 else slice(None) for a in AXES)
 
 
 def level_std_k(derivatives: Derivatives) -> float:

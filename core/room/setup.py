@@ -138,14 +138,17 @@ def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlan
         float(layout.heated[wall]) * closed * jnp.exp(parameters.log_heat + parameters.wall_log_heat[wall])
     )
     heat = conductance * parameters.wall_excess_k[wall]
+    held = jnp.full_like(conductance, layout.held[wall])
     for n, opening in enumerate(layout.heaters):
         if opening.wall == wall:
-            own = jnp.asarray(opening.fraction, jnp.float32) * jnp.exp(parameters.heater_log_heat[n])
+            fraction = jnp.asarray(opening.fraction, jnp.float32)
+            own = fraction * jnp.exp(parameters.heater_log_heat[n])
             conductance, heat = conductance + own, heat + own * parameters.heater_excess_k[n]
+            held = jnp.maximum(held, fraction)
     return eqx.tree_at(
         lambda w: (w.conductance_m_s, w.wall_excess_k, w.held),
         plane,
-        (conductance, heat / (conductance + 1e-12), jnp.float32(layout.held[wall])),
+        (conductance, heat / (conductance + 1e-12), held),
     )
 
 

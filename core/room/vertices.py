@@ -23,11 +23,11 @@ def vertex_axes_m(grid: RoomGrid, vertices: tuple[int, int, int]) -> tuple[Float
 
 
 def vertex_excess_k(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> Vertices:
-    """Excess temperature: inlets carry the supply's, heat-passing walls their own, others their air's."""
+    """Excess temperature: inlets carry the supply's, what passes heat its own where stated, others their air's."""
 
     def value(wall: WallPlane, cell: Field, inward: float) -> Field:
-        known = (wall.conductance_m_s > 0) & (wall.held > 0)
-        held = jnp.where(known, wall.wall_excess_k, cell)
+        share = jnp.where(wall.conductance_m_s > 0, wall.held, 0.0)
+        held = share * wall.wall_excess_k + (1.0 - share) * cell
         return jnp.where(inward * wall.normal_m_s > 0, wall.inflow_excess_k, held)
 
     planes = _on_walls(flow.excess_k, model.boundary, value)

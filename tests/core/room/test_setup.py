@@ -9,6 +9,7 @@ from core.problem import Problem
 from core.room.boundary import closed_room
 from core.room.closure import ConstantClosure, KEpsilonClosure
 from core.room.grid import room_grid
+from core.room.hold import free_vertices
 from core.room.k_epsilon import wall_sources
 from core.room.level import layer_exchange_m3_s
 from core.room.march import advance_chunk
@@ -131,6 +132,26 @@ def test_a_room_with_jet_outlet_and_heater_marches_without_divergence():
     assert np.all(velocity[:, 0] == 0)
     # Two seconds of supply push air along x.
     assert velocity[..., 0].max() > 0.1
+
+
+def test_a_heater_shows_its_own_temperature_on_its_vertices_which_no_correction_moves():
+    grid = room_grid(ROOM, 16)
+    walls = (Wall(wall="z_min", thermal="adiabatic"), Wall(wall="y_min", thermal="adiabatic"))
+    layout = room_layout(scene(SUPPLY, EXHAUST, FLOOR, *walls), grid)
+    closure = KEpsilonClosure(jnp.float32(1.0), jnp.float32(1.5e-5))
+    model = room_model(
+        grid, boundary(layout, parameters(1, 1)), closure, buoyancy_m_s2_k=0.0, molecular_m2_s=1.5e-5
+    )
+    # 17, 13 and 11 vertices stand 0.25 m apart: the patch spans those from 1 to 2 m.
+    shape = (17, 13, 11)
+    excess = np.asarray(vertex_excess_k(air_at_rest(model, jnp.full(grid.cells, 3.0), 0.5), model, shape))
+    free = free_vertices(layout, shape)
+
+    assert excess[5:8, 5:8, 0] == pytest.approx(20.0, abs=1e-3)
+    assert free[5:8, 5:8, 0] == pytest.approx(0.0, abs=1e-6)
+    assert excess[10:12, 5:8, 0] == pytest.approx(3.0)
+    assert np.all(free[10:12, 5:8, 0] == 1.0)
+    assert np.all(free[..., 1:-1] == 1.0)
 
 
 def test_layers_exchange_all_heat_that_is_not_lost():
