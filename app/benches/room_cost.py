@@ -27,9 +27,8 @@ from core.room.grid import AXES
 from core.room.march import MarchSettings, march
 from core.room.model import Flow
 from core.room.prior import Prior, room_prior
-from core.room.room import Room, carried_over, room
+from core.room.room import Room, carried_over, closure_name, room
 from core.room.runs import Attempt, RoomSettings, attempt, first_profile_k, perturbed
-from core.solve.room import closure_name
 
 _VERTICES = (64, 64, 64)
 

@@ -17,11 +17,10 @@ from core.problem import Problem
 from core.room.model import longest_step_s
 from core.room.plane_openings import with_plane_openings
 from core.room.prior import room_prior
-from core.room.room import room
+from core.room.room import closure_name, room
 from core.room.runs import RoomSettings, settled
 from core.scene import Heater, Inlet, Scene, Wall
 from core.setting import SettingError
-from core.solve.room import closure_name
 
 Volume = Float[np.ndarray, "nx ny nz"]
 

@@ -21,6 +21,8 @@ from core.uncertainty import Deviation, Represented, deviation
 _UNSEEN_SHARE = 0.3
 # What grid, closure and scale leave open (a, c and b of `core.uncertainty`).
 _SHARES = {"excess_k": (0.1, 1.0, 0.2), "pressure_m2_s2": (0.3, 2.0, 5.0), "velocity_m_s": (0.5, 2.0, 0.38)}
+# Of c, where one guessed viscosity stands for all air: images that a map of it explains do not make it the right one.
+_GUESSED_VISCOSITY = 8.0
 
 
 class Solved(eqx.Module):
@@ -132,5 +134,7 @@ def _deviation(
             # The profile of height is measured by the plane; only departures from it are the grid's.
             between[0] = between[0] - between[0].mean((0, 1))
     a, c, b = _SHARES[name]
+    if float(solved.prior.std.log_viscosity.max()) > 0:
+        c *= _GUESSED_VISCOSITY
     represented = Represented(between[0], between[1], scale, (a, c * share, b * share))
     return deviation(moved, solved.posterior.covariance, represented, extra)

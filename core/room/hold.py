@@ -81,13 +81,13 @@ def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.n
     free = np.ones(shape)
     for wall in np.flatnonzero(layout.held):
         free[_plane(wall)] = 0.0
-    for heater in layout.heaters:
+    for heater in (h for h, shown in zip(layout.heaters, layout.shown, strict=True) if shown):
         first, second = (cell_matrix(layout.grid, a, shape[a]) for a in AXES if a != heater.axis)
         free[_plane(heater.wall)] *= 1.0 - first @ np.pad(heater.fraction, 1) @ second.T
     return free
 
 
-def _plane(wall: int) -> tuple[slice | int, ...]:
+def _plane(wall: int | np.integer) -> tuple[slice | int, ...]:
     return tuple((-1 if wall % 2 else 0) if a == wall // 2 else slice(None) for a in AXES)
 
 

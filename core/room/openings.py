@@ -74,15 +74,20 @@ def opening_edges_m(scene: Scene) -> tuple[tuple[float, ...], ...]:
 def refuse_overlaps(patches: list[Patch]) -> None:
     """Raise SettingError if two patches of a wall share area."""
     for one, other in combinations(patches, 2):
-        shared = [
-            min(h1, h2) - max(l1, l2)
-            for l1, h1, l2, h2 in zip(one.lower_m, one.upper_m, other.lower_m, other.upper_m, strict=True)
-        ]
-        if one.wall == other.wall and min(shared) > 1e-9:
+        if share_area(one, other):
             raise SettingError(
                 f"Two patches on {one.wall} overlap: {one.lower_m} to {one.upper_m} and {other.lower_m} to "
                 f"{other.upper_m} m. Move them apart: a face is an inlet, an outlet or a heater."
             )
+
+
+def share_area(one: Patch, other: Patch) -> bool:
+    """Whether two patches lie over one another."""
+    shared = [
+        min(h1, h2) - max(l1, l2)
+        for l1, h1, l2, h2 in zip(one.lower_m, one.upper_m, other.lower_m, other.upper_m, strict=True)
+    ]
+    return one.wall == other.wall and min(shared) > 1e-9
 
 
 def refuse_outward(inlet: Inlet, opening: Opening) -> None:

@@ -15,15 +15,20 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float
 
 from core.problem import Problem
+from core.room.balance import (
+    WALL_HEAT_M_S,
+    free_walls_k,
+    heat_balance_m_s,
+    outflow_excess_k,
+    supply_m3_s,
+)
 from core.room.grid import WALLS
-from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.room.openings import stated_walls
-from core.room.plane_openings import air_planes, still_vertices
-from core.room.setup import RoomLayout, RoomParameters
-from core.scene import Heater, Inlet, Outlet
+from core.room.setup import RoomLayout, RoomParameters, SuspectedHeater
+from core.scene import Heater, Inlet
 
-# 1.6 W/m2K over rho c; within a factor of two (one sigma 0.6 in the logarithm).
-_WALL_HEAT_M_S, _WALL_HEAT_STD = NOMINAL_HEAT_M_S, 0.6
+# Walls' heat coefficients are right within a factor of two (one sigma 0.6 in the logarithm).
+_WALL_HEAT_STD = 0.6
 # Where walls' temperatures are free, their common coefficient is nearly the same degree of freedom.
 _SHARED_HEAT_STD = 0.3
 # Spread of unknown walls: of their distance from the air, and at least of the supply's contrast.
@@ -31,6 +36,9 @@ _WALL_SHARE, _LEAST_WALL_SHARE = 1.0, 0.2
 _HEATER_HEAT_M_S, _HEATER_HEAT_STD = 2.5e-3, 0.5
 # A viscosity that the images may choose absorbs every other misfit and spoils u: k-epsilon keeps its own.
 _CLOSURE_STD, _SIMPLE_CLOSURE_STD = 0.12, 0.25
+# One viscosity for all air is no room's: where nobody stated its value either, the images may choose it from place
+# to place, within a factor of 4.5 (one sigma).
+_GUESSED_VISCOSITY_STD = 1.5
 _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
 # Where walls are unknown their temperatures and their common heat coefficient are much the same freedom.
 WALL_PARAMETERS = ("wall_excess_k", "log_heat")
@@ -100,14 +108,25 @@ class Prior(eqx.Module):
             named += [f"{stem}[{n}]" if np.ndim(leaf) else stem for n in range(np.size(leaf))]
         return [named[n] for n in self.active()]
 
+    def suspected(self) -> Bool[np.ndarray, " active"]:
+        """Which fitted parameters are the heat of heaters that nobody stated: those without a coefficient."""
+        bare = {f"heater_excess_k[{n}]" for n in np.flatnonzero(np.asarray(self.std.heater_log_heat) == 0)}
+        return np.array([name in bare for name in self.names()], bool)
+
     def firm(self) -> Bool[np.ndarray, " active"]:
-        """Which fitted parameters nobody entered, so that nobody did so wrongly: the closure, unknown walls."""
+        """Which fitted parameters nobody entered, so that nobody did so wrongly: the closure, unknown walls.
+
+        Where heat is suspected that nobody stated, nothing else is taken for wrong beside it.
+        """
+        suspected = self.suspected()
+        if suspected.any():
+            return ~suspected
         own = ("log_closure", "log_viscosity", *(WALL_PARAMETERS if self.unknown_walls() else ()))
         return np.array([name.startswith(own) for name in self.names()], bool)
 
 
 def room_prior(
-    problem: Problem, layout: RoomLayout, *, log_viscosity_std: float = 0.0, wall_heat: float = 1.0
+    problem: Problem, layout: RoomLayout, *, log_viscosity_std: float | None = None, wall_heat: float = 1.0
 ) -> Prior:
     """Parameters as stated, and their spread; `wall_heat` multiplies every wall's heat coefficient."""
     scene = problem.scene
@@ -122,9 +141,9 @@ def room_prior(
         [0.0 if w is None or w.temperature_k is None else w.temperature_k - ambient for w in walls]
     )
     free = (layout.heated > 0) & (layout.held == 0)
-    balanced = None if free.any() else _heat_balance_m_s(problem, layout, excess, wall_excess)
-    heat_m_s = _WALL_HEAT_M_S if balanced is None else balanced
-    own, apart_k = _free_walls_k(problem, layout, excess, wall_excess)
+    balanced = None if free.any() else heat_balance_m_s(problem, layout, excess, wall_excess)
+    heat_m_s = WALL_HEAT_M_S if balanced is None else balanced
+    own, apart_k = free_walls_k(problem, layout, excess, wall_excess)
     wall_excess = np.where(free, own, wall_excess)
     mean = RoomParameters(
         _f32(excess),
@@ -138,6 +157,9 @@ def room_prior(
         jnp.zeros((3, 3, 4)),
     )
     simple = scene.flow.transport in ("given", "zero_equation")
+    if log_viscosity_std is None:
+        guessed = scene.flow.transport == "given" and scene.flow.viscosity_m2_s is None
+        log_viscosity_std = _GUESSED_VISCOSITY_STD if guessed else 0.0
     std = RoomParameters(
         _f32([max(i.temperature_std_k, _LEAST_SHARE_T * contrast) for i in inlets]),
         _f32([max(i.velocity_std_m_s / s, _LEAST_SHARE_U) for i, s in zip(inlets, speed, strict=True)]),
@@ -145,94 +167,12 @@ def room_prior(
         _f32(np.where(free, max(_WALL_SHARE * apart_k, _LEAST_WALL_SHARE * contrast), 0.0)),
         jnp.zeros(6),
         _f32([h.temperature_std_k for h in heaters]),
-        jnp.full(len(heaters), _HEATER_HEAT_STD),
+        _f32([_HEATER_HEAT_STD * (not isinstance(h, SuspectedHeater)) for h in heaters]),
         jnp.float32(_SIMPLE_CLOSURE_STD if simple else _CLOSURE_STD),
         jnp.full((3, 3, 4), log_viscosity_std),
     )
     leaving = None if balanced is None else outflow_excess_k(problem)
-    return Prior(mean, std, _supply_m3_s(layout), leaving)
-
-
-def outflow_excess_k(problem: Problem) -> float | None:
-    """Temperature of the leaving air, by an outlet's thermometer or a plane's outflow; None if unknown."""
-    ambient = problem.scene.air.ambient_temperature_k
-    for part in problem.scene.boundary:
-        if isinstance(part, Outlet) and part.mean_temperature_k is not None:
-            return part.mean_temperature_k - ambient
-    for plane in problem.planes:
-        axis = WALLS.index(plane.wall) // 2
-        outward = plane.velocity_m_s[..., axis] * (-1.0 if plane.wall.endswith("min") else 1.0)
-        leaving = np.maximum(outward, 0.0)
-        if leaving.sum() > 0:
-            return float((leaving * (plane.temperature_k - ambient)).sum() / leaving.sum())
-    return None
-
-
-def _free_walls_k(
-    problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
-) -> tuple[float, float]:
-    """The one temperature of all unknown walls that closes the heat balance, and its distance from the air.
-
-    Without a thermometer in what leaves it is the ambient one; it stays within the supply's contrast.
-    """
-    leaving = outflow_excess_k(problem)
-    if leaving is None or not layout.inlets:
-        return 0.0, 0.0
-    areas = _heated_areas_m2(layout)
-    free = areas * (layout.held == 0)
-    if free.sum() == 0:
-        return 0.0, 0.0
-    inside = _room_excess_k(problem, leaving)
-    brought = float(np.dot(_supply_m3_s(layout), inlet_excess_k - leaving))
-    known = _WALL_HEAT_M_S * float(((areas - free) * (inside - wall_excess_k)).sum())
-    apart = (brought - known) / (_WALL_HEAT_M_S * float(free.sum()))
-    contrast = max(float(np.abs(inlet_excess_k).max()), abs(inside))
-    apart = float(np.clip(apart, -contrast, contrast))
-    return inside - apart, abs(apart)
-
-
-def _heated_areas_m2(layout: RoomLayout) -> Float[np.ndarray, "6"]:
-    """Area of each wall that passes heat."""
-    grid = layout.grid
-    return (
-        np.array([grid.face_area_m2(w // 2) * np.prod(grid.plane(w // 2)) for w in range(6)]) * layout.heated
-    )
-
-
-def _supply_m3_s(layout: RoomLayout) -> Float[np.ndarray, " inlets"]:
-    """Volume flow of each inlet as stated."""
-    return np.array(
-        [
-            o.inward * v[o.axis] * o.area_m2
-            for o, v in zip(layout.inlets, layout.inlet_velocity_m_s, strict=True)
-        ]
-    )
-
-
-def _heat_balance_m_s(
-    problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
-) -> float | None:
-    """One heat coefficient for all walls that closes the balance, within a factor of four of the guess; or None."""
-    leaving = outflow_excess_k(problem)
-    areas = _heated_areas_m2(layout)
-    if leaving is None or not layout.inlets or layout.heaters or areas.sum() == 0:
-        return None
-    brought = float(np.dot(_supply_m3_s(layout), inlet_excess_k - leaving))
-    inside = _room_excess_k(problem, leaving)
-    lost = float((areas * (inside - wall_excess_k)).sum())
-    # Heat that flows from cold to warm says that something else is missing, not how well walls conduct.
-    if not brought * lost > 0:
-        return None
-    return float(np.clip(brought / lost, _WALL_HEAT_M_S / 4, _WALL_HEAT_M_S * 4))
-
-
-def _room_excess_k(problem: Problem, leaving: float) -> float:
-    """Mean temperature of the room's air: a side wall's plane, else what leaves."""
-    for plane in air_planes(problem):
-        return (
-            float(plane.temperature_k[still_vertices(plane)].mean()) - problem.scene.air.ambient_temperature_k
-        )
-    return leaving
+    return Prior(mean, std, supply_m3_s(layout), leaving)
 
 
 def _f32(values: object) -> Float[Array, "..."]:

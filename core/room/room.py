@@ -88,6 +88,12 @@ class Room(eqx.Module):
         return KEpsilonClosure(scale, molecular)
 
 
+def closure_name(scene: Scene) -> str:
+    """The closure that a scene asks for; `auto` and `learned` start from k-epsilon."""
+    named = {"molecular": "molecular", "given": "constant", "zero_equation": "zero_equation"}
+    return named.get(scene.flow.transport, "k_epsilon")
+
+
 def room(scene: Scene, cells: int, closure: str) -> Room:
     """Lay `scene` on about cells^3 cells. Raises SettingError for a boundary that cannot be."""
     layout = room_layout(scene, room_grid(scene.room, cells, opening_edges_m(scene)))

@@ -45,12 +45,16 @@ def coarse_fit(
 
     What the coarse grid gets wrong is taken from the fine one under the stated parameters, so that it moves none.
     Far from where it was made a Jacobian misleads: it is made anew after every `settings.straight` prior deviations.
-    Walls that nobody knows are left to the fine room: the coarse one's own errors would move them.
+    Walls that nobody knows are left to the fine room: the coarse one's own errors would move them. Not so where
+    heat is suspected that nobody stated: without it the room is another one.
     """
     coarse, prior, base, derivatives = begun.coarse, begun.prior, begun.base, begun.derivatives
     vector = linearised = np.zeros(len(prior.active()))
     finer = data.predicted(begun.first.seen) - data.predicted(base.seen)
-    rounds = settings.coarse_rounds if settings.use_images and not prior.unknown_walls() else 0
+    suspected = prior.suspected().any()
+    moves = settings.use_images and (suspected or not prior.unknown_walls())
+    rounds = settings.coarse_rounds if moves else 0
+    straight = settings.straight_walls if suspected else settings.straight
     for n in range(rounds):
         # Where the parameters have moved, half of what was taken off may be wrong.
         new = corrected(
@@ -65,7 +69,7 @@ def coarse_fit(
         if left > settings.worthwhile:
             break
         vector, base = new, tried
-        if farthest(vector, linearised) > settings.straight:
+        if farthest(vector, linearised) > straight:
             derivatives, linearised = perturbed(coarse, prior, vector, base, settings, data.vertices), vector
     if np.any(vector != linearised):
         derivatives = perturbed(coarse, prior, vector, base, settings, data.vertices)
@@ -113,7 +117,9 @@ def fine_fit(
         best, stale = new, 0 if left < _GAIN else stale + 1
         least = new if left < 1.0 else least
         if again > 0 and n % 2 == 1 and farthest(new.posterior.vector, linearised) > settings.straight_walls:
-            again, linearised, stale = again - 1, new.posterior.vector, 0
+            # Not from a room that went astray.
+            best = least.known_as(best) if left > _WOBBLE else best
+            again, linearised, stale = again - 1, best.posterior.vector, 0
             derivatives = made_again(linearised)
         elif step < settings.fine_step or stale == _PATIENCE:
             break

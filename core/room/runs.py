@@ -9,12 +9,13 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from core.problem import Problem
+from core.room.balance import outflow_excess_k
 from core.room.boundary import set_normal
 from core.room.march import March, MarchSettings, march
 from core.room.model import Flow
 from core.room.observe import Prediction
 from core.room.plane_openings import air_planes, still_vertices
-from core.room.prior import WALL_PARAMETERS, Prior, outflow_excess_k
+from core.room.prior import WALL_PARAMETERS, Prior
 from core.room.room import Room, room, seen
 from core.room.setup import RoomParameters
 from core.scene import Inlet
@@ -26,7 +27,8 @@ Event = Callable[[dict[str, float]], object]
 # half a deviation the wobble outweighs what 1 % of a supply does, and the fit of a wrong supply does not end.
 # Walls that nobody knows may be off by half the supply's excess, and jets swerve: two deviations to one side
 # point where 0.25 do to 0.34-0.66 (cosine, shifts of case A), half of one to 0.77-0.94.
-_DIFFERENCE, _WALLS_DIFFERENCE = 2.0, 0.3
+# So does air above a heater: one of 60 K is another room, one of 14 K points the way.
+_DIFFERENCE, _WALLS_DIFFERENCE, _SUSPECTED_DIFFERENCE = 2.0, 0.3, 0.7
 
 # Steps a cell of the room's edge and second of the reference room, which takes half as many: a room whose
 # air turns out far faster than what was stated about it must not take hours.
@@ -45,7 +47,8 @@ class RoomSettings:
     A Jacobian serves for `straight` prior deviations; where walls are unknown the fine room's is made again up
     to `again` times, once parameters moved by `straight_walls`. The fine room's rounds end with a step below
     `fine_step`; the longest march, `final_s`, follows. `wall_heat` multiplies what the balance, or the usual
-    guess, gives for the walls' heat coefficient.
+    guess, gives for the walls' heat coefficient. `log_viscosity_std` is how far the eddy viscosity may vary over
+    the room, in its logarithm; None for what the closure asks for (`core.room.prior`).
     """
 
     cells: int = 48
@@ -64,7 +67,7 @@ class RoomSettings:
     refine_s: float = 60.0
     final_s: float = 90.0
     use_images: bool = True
-    log_viscosity_std: float = 0.0
+    log_viscosity_std: float | None = None
     wall_heat: float = 1.0
     threads: int = 2
 
@@ -181,7 +184,8 @@ def perturbed(
 def differences(prior: Prior) -> Float[np.ndarray, " active"]:
     """By how many prior deviations each parameter is moved to see what it does."""
     walls = [bool(prior.unknown_walls()) and name.startswith(WALL_PARAMETERS) for name in prior.names()]
-    return np.where(walls, _WALLS_DIFFERENCE, _DIFFERENCE)
+    sizes = np.where(walls, _WALLS_DIFFERENCE, _DIFFERENCE)
+    return np.where(prior.suspected(), _SUSPECTED_DIFFERENCE, sizes)
 
 
 def other_closure(where: Room) -> str:

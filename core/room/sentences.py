@@ -8,7 +8,7 @@ from core.room.fit import Posterior
 from core.room.observe import Observations
 from core.room.openings import stated_walls
 from core.room.prior import FITTED_AS_ONE, Prior
-from core.room.setup import RoomParameters
+from core.room.setup import RoomParameters, SuspectedHeater
 from core.scene import Heater, Inlet
 
 # An entry is contradicted when the fit moves it by this many of its stated deviations, and of its own.
@@ -16,6 +16,8 @@ _SIGMAS = 2.0
 # Of the heat that supplies bring: what is missing beyond that is said.
 _MISSING_SHARE = 0.1
 _POOR_FIT = 0.35
+# Of a panel's temperature above the air: less is no heater.
+_SUSPICIOUS_K = 8.0
 
 
 def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list[str]:
@@ -42,8 +44,10 @@ def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list
                 "times the velocity entered. Check it."
             )
     for n, heater in enumerate(heaters):
-        if f"heater_excess_k[{n}]" in believed:
-            by_k = float(fitted.heater_excess_k[n] - prior.mean.heater_excess_k[n])
+        by_k = float(fitted.heater_excess_k[n] - prior.mean.heater_excess_k[n])
+        if isinstance(heater, SuspectedHeater):
+            said += suspicion(heater, by_k)
+        elif f"heater_excess_k[{n}]" in believed:
             said.append(
                 f"The measurements say that the heater on {heater.patch.wall} is "
                 f"{abs(by_k):.1f} K {'warmer' if by_k > 0 else 'colder'} than the "
@@ -55,6 +59,20 @@ def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list
             "viscosity: another closure may describe this room better."
         )
     return said
+
+
+def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
+    """What the images say of a strip of floor, where it is worth saying."""
+    if abs(by_k) < _SUSPICIOUS_K:
+        return []
+    lower, upper = heater.patch.lower_m, heater.patch.upper_m
+    size = " x ".join(f"{high - low:.2f}" for low, high in zip(lower, upper, strict=True))
+    return [
+        f"The images ask for {'heat' if by_k > 0 else 'cold'} that is not in the scene: as of a floor panel of "
+        f"{size} m, {abs(by_k):.0f} K {'warmer' if by_k > 0 else 'colder'} than the air, at x = {lower[0]:.1f} to "
+        f"{upper[0]:.1f} m. How deep in the room it is one view does not tell: half-way was taken. State it as a "
+        "heater."
+    ]
 
 
 def misfit(data: Observations, share: float) -> list[str]:
@@ -110,7 +128,8 @@ def balances(
 
 def undetermined(problem: Problem) -> list[str]:
     """What the stated information cannot determine."""
-    if not any(isinstance(b, Inlet | Heater) for b in problem.scene.boundary):
+    driving = [b for b in problem.scene.boundary if isinstance(b, Inlet | Heater)]
+    if all(isinstance(b, SuspectedHeater) for b in driving):
         return [
             "No inlet or heater is stated: nothing says what drives the air. Velocity is not determined by "
             "these measurements; the one given is that of still air left to the walls, and is not to be used."

@@ -25,6 +25,10 @@ from core.scene import Heater, Inlet, Outlet, Scene
 from core.setting import SettingError
 
 
+class SuspectedHeater(Heater):
+    """A heater that nobody stated: its heat is fitted, its temperature means nothing by itself and is not shown."""
+
+
 class RoomParameters(eqx.Module):
     """What may be wrong, one array a kind. Temperatures in excess of ambient; logarithms are natural.
 
@@ -45,7 +49,10 @@ class RoomParameters(eqx.Module):
 
 
 class RoomLayout(eqx.Module):
-    """Where openings and heaters are; what is stated about them; sentences about what was repaired."""
+    """Where openings and heaters are; what is stated about them; sentences about what was repaired.
+
+    `shown` says of each heater whether vertices on it have its temperature.
+    """
 
     grid: RoomGrid
     inlets: tuple[Opening, ...]
@@ -53,6 +60,7 @@ class RoomLayout(eqx.Module):
     inlet_k_epsilon: Float[np.ndarray, "inlets 2"]
     outlets: tuple[Opening, ...]
     heaters: tuple[Opening, ...]
+    shown: tuple[bool, ...] = eqx.field(static=True)
     heated: Float[np.ndarray, "6"]
     grip: Float[np.ndarray, "6"]
     held: Float[np.ndarray, "6"]
@@ -101,6 +109,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
         np.array([supply_turbulence(i) for i in inlets], float).reshape(-1, 2),
         tuple(place[1]),
         tuple(place[2]),
+        tuple(not isinstance(heater, SuspectedHeater) for heater in heaters),
         heated,
         grip,
         held,
@@ -144,7 +153,7 @@ def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlan
             fraction = jnp.asarray(opening.fraction, jnp.float32)
             own = fraction * jnp.exp(parameters.heater_log_heat[n])
             conductance, heat = conductance + own, heat + own * parameters.heater_excess_k[n]
-            held = jnp.maximum(held, fraction)
+            held = jnp.maximum(held, fraction * float(layout.shown[n]))
     return eqx.tree_at(
         lambda w: (w.conductance_m_s, w.wall_excess_k, w.held),
         plane,

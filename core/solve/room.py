@@ -12,10 +12,10 @@ import numpy as np
 from core.problem import Problem
 from core.result import Solution
 from core.room.answer import Solved, solution, unexplained
-from core.room.observe import observations
+from core.room.observe import Observations, observations
 from core.room.plane_openings import with_plane_openings
 from core.room.prior import room_prior
-from core.room.room import Room, carried_over, room
+from core.room.room import Room, carried_over, closure_name, room
 from core.room.rounds import Begun, Vector, coarse_fit, fine_fit, held_fit
 from core.room.runs import (
     Attempt,
@@ -30,7 +30,7 @@ from core.room.runs import (
 )
 from core.room.sentences import another_closure
 from core.room.setup import RoomLayout
-from core.scene import Scene
+from core.room.sources import explained_by_strips, unexplained_as_stated, with_suspected_heaters
 
 
 def solve_room(
@@ -75,16 +75,33 @@ def finish(
     Where a coarse room under another closure explains the images better than the best fine one does, and nobody
     stated the closure, that one is fitted as well and the better of the two is taken.
     """
+    begun = with_sources(begun, problem, settings, tell)
     solved = fitted_room(begun, problem, settings, tell)
     notes: tuple[str, ...] = ()
     name = promising_closure(solved, begun.coarse) if settings.use_images else None
     if name is not None:
-        again = fitted_room(begin(problem, settings, tell, name), problem, settings, tell)
+        again = fitted_room(begin(begun.problem, settings, tell, name), problem, settings, tell)
         left = [unexplained(s.data, s.best.seen) for s in (solved, again)]
         if left[1] < left[0]:
             solved, notes = again, (another_closure(name, left[1], begun.coarse.closure, left[0]),)
     tell(supplied(solved.layout, solved.best))
     return solution(solved, time.perf_counter() - start_s, use_images=settings.use_images, notes=notes)
+
+
+def with_sources(begun: Begun, problem: Problem, settings: RoomSettings, tell: Event) -> Begun:
+    """The room as it was begun; with heat that nobody stated where the images cannot be explained otherwise."""
+    data = data_of(begun, problem, settings)
+    if not settings.use_images or not unexplained_as_stated(begun, data):
+        return begun
+    suspected = begin(with_suspected_heaters(begun.problem), settings, tell, begun.coarse.closure)
+    return suspected if explained_by_strips(suspected, data) else begun
+
+
+def data_of(begun: Begun, problem: Problem, settings: RoomSettings) -> Observations:
+    """The data of `problem`, as vertices of the room that was begun see them."""
+    stated = begun.problem
+    of = Problem(stated.scene, problem.shifts, stated.planes, stated.sensors)
+    return observations(of, (settings.vertices, settings.vertices, settings.vertices))
 
 
 def promising_closure(solved: Solved, coarse: Room) -> str | None:
@@ -98,10 +115,8 @@ def promising_closure(solved: Solved, coarse: Room) -> str | None:
 def fitted_room(begun: Begun, problem: Problem, settings: RoomSettings, tell: Event) -> Solved:
     """Parameters and level that measurements ask for, and what deviations are made of."""
     coarse, fine, prior = begun.coarse, begun.fine, begun.prior
-    stated = begun.problem
-    problem = Problem(stated.scene, problem.shifts, stated.planes, stated.sensors)
     vertices = (settings.vertices, settings.vertices, settings.vertices)
-    data = observations(problem, vertices)
+    data = data_of(begun, problem, settings)
     vector, base, linearised = coarse_fit(begun, data, settings, tell)
     other = otherwise_closed(coarse, prior.parameters(vector), base, settings, vertices)
     first = begun.first
@@ -117,7 +132,7 @@ def fitted_room(begun: Begun, problem: Problem, settings: RoomSettings, tell: Ev
     if settings.use_images:
         best = held_fit(fine, prior, data, before, derivatives, settings, tell)
     return Solved(
-        problem,
+        begun.problem,
         data,
         prior,
         found.posterior,
@@ -141,9 +156,3 @@ def supplied(layout: RoomLayout, best: Attempt) -> dict[str, float]:
             f"supply_{n + 1}_m_s": speed,
         }
     return found
-
-
-def closure_name(scene: Scene) -> str:
-    """The closure that a scene asks for; `auto` and `learned` start from k-epsilon."""
-    named = {"molecular": "molecular", "given": "constant", "zero_equation": "zero_equation"}
-    return named.get(scene.flow.transport, "k_epsilon")

@@ -10,7 +10,7 @@ from core.room.grid import WALLS
 from core.room.observe import Prediction
 from core.room.runs import Derivatives, differences
 from core.room.sentences import undetermined
-from core.scene import Wall
+from core.scene import FlowModel, Wall
 from tests.core.room.test_hold import VERTICES, prior_of, problem
 
 
@@ -76,3 +76,20 @@ def test_derivatives_are_per_prior_deviation_whatever_the_steps():
     np.testing.assert_allclose(found.per_deviation(lambda seen: seen.outflow_excess_k), [6.0, 4.0])
     empty = Derivatives(room_of(1.0), [], np.zeros(0))
     assert empty.per_deviation(lambda seen: seen.excess_k).shape == (0, *VERTICES)
+
+
+@pytest.mark.parametrize(
+    ("flow", "fitted"),
+    [
+        (FlowModel(transport="given"), True),
+        (FlowModel(transport="given", viscosity_m2_s=1e-3), False),
+        (FlowModel(), False),
+    ],
+)
+def test_one_viscosity_that_nobody_stated_may_vary_over_the_room(flow: FlowModel, fitted: bool):
+    given = problem(stated=True)
+    prior = prior_of(Problem(replace(given.scene, flow=flow), ()))
+    lattice = [name for name in prior.names() if name.startswith("log_viscosity")]
+
+    assert len(lattice) == (36 if fitted else 0)
+    assert all(prior.firm()[[name in lattice for name in prior.names()]])

@@ -1,4 +1,5 @@
 import dataclasses
+from dataclasses import replace
 from typing import Literal
 
 import equinox as eqx
@@ -13,13 +14,15 @@ from core.result import Solution
 from core.room.observe import observations
 from core.room.rounds import coarse_fit, fine_fit, misfit_ratio
 from core.room.runs import Derivatives
-from core.scene import FixedTexture, FlowModel, Inlet, Outlet, Patch, Scene, View, Wall
+from core.scene import FixedTexture, FlowModel, Heater, Inlet, Outlet, Patch, Scene, View, Wall
 from core.solve.room import (
     RoomSettings,
     begin,
+    data_of,
     fitted_room,
     promising_closure,
     solve_room,
+    with_sources,
 )
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(2.0, 2.0, 2.0))
@@ -167,3 +170,27 @@ def test_another_closure_is_tried_where_it_leaves_less_of_the_images(
 
     assert promising_closure(closer, begun.coarse) == wanted
     assert promising_closure(farther, begun.coarse) is None
+
+
+@pytest.mark.parametrize("heated", [True, False])
+def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothing_else_explains(
+    heated: bool,
+):
+    patch = Patch(wall="z_min", lower_m=(1.2, 0.8), upper_m=(1.6, 1.2))
+    openings = scene(
+        dataclasses.replace(SUPPLY, temperature_k=292.15, velocity_m_s=(0.1, 0.0, 0.0))
+    ).boundary[:2]
+    heater = (Heater(patch=patch, temperature_k=343.15),) if heated else ()
+    there = replace(scene(SUPPLY), boundary=(*openings, *heater))
+    entered = replace(there, boundary=openings)
+    problem = measured(entered, solve_room(Problem(there, ()), SETTINGS), 1e-5)
+    problem = Problem(problem.scene, problem.shifts)
+    begun = with_sources(begin(problem, SETTINGS, lambda _: None), problem, SETTINGS, lambda _: None)
+
+    assert len(begun.fine.layout.heaters) == (5 if heated else 0)
+    if heated:
+        vector, _, _ = coarse_fit(begun, data_of(begun, problem, SETTINGS), SETTINGS, lambda _: None)
+        moved = dict(zip(begun.prior.names(), vector, strict=True))
+        strips = [moved[f"heater_excess_k[{n}]"] for n in range(5)]
+        assert np.argmax(strips) == 3
+        assert strips[3] > 1.0
