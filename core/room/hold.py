@@ -16,6 +16,9 @@ from core.room.runs import Attempt, Derivatives
 from core.room.setup import RoomLayout
 from core.room.vertices import cell_matrix
 
+# Air of one temperature departs from nothing, yet images may say otherwise.
+_LEAST_DEPARTURE_K = 1e-3
+
 
 def to_hold_k(
     data: Observations,
@@ -65,7 +68,7 @@ def last_correction(
     data: Observations, prior: Prior, derivatives: Derivatives, seen: Prediction
 ) -> Correction:
     """The correction of T by all that parameters leave unexplained."""
-    own_k = departure(seen.excess_k)
+    own_k = max(departure(seen.excess_k), _LEAST_DEPARTURE_K)
     level_k = max(own_k, level_std_k(derivatives))
     residual = data.values()[0] - data.predicted(seen)
     return temperature_correction(data, seen.excess_k, residual, own_k, level_k, prior.unknown_walls())

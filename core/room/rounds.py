@@ -55,6 +55,8 @@ def coarse_fit(
     moves = settings.use_images and (suspected or not prior.unknown_walls())
     rounds = settings.coarse_rounds if moves else 0
     straight = settings.straight_walls if suspected else settings.straight
+    # Air above a heater is slow to follow its derivatives: what brings it any nearer is a step on the way.
+    worthwhile = 1.0 if suspected else settings.worthwhile
     for n in range(rounds):
         # Where the parameters have moved, half of what was taken off may be wrong.
         new = corrected(
@@ -66,7 +68,7 @@ def coarse_fit(
         tried = attempt(coarse, where, base.flow.last, seconds, data.vertices, tell)
         left = misfit_ratio(data, tried, base, finer)
         tell({"coarse_round": n + 1.0, "misfit_left": left, **fitted(prior, new)})
-        if left > settings.worthwhile:
+        if left > worthwhile:
             break
         vector, base = new, tried
         if farthest(vector, linearised) > straight:

@@ -25,7 +25,7 @@ _STRIPS, _DEPTH_SHARE = 5, 0.2
 _STRIP_STD_K = 20.0
 # A room whose derivatives leave less than this of the images has its heat where it was stated; strips are kept
 # where they leave less than that share of what the room leaves without them.
-_EXPLAINED, _WORTHWHILE = 0.45, 0.8
+_EXPLAINED, _WORTHWHILE = 0.55, 0.8
 
 
 def with_suspected_heaters(problem: Problem) -> Problem:

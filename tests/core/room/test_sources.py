@@ -55,7 +55,7 @@ def test_a_strip_s_heat_is_fitted_and_its_temperature_shown_nowhere():
     assert prior.suspected().sum() == 5
     # Beside suspected heat, nothing that was entered is let go as well.
     np.testing.assert_array_equal(prior.firm(), ~prior.suspected())
-    np.testing.assert_allclose(differences(prior)[prior.suspected()], 0.7)
+    np.testing.assert_allclose(differences(prior)[prior.suspected()], 1.5)
     assert layout.shown == (False,) * 5
     assert float(floor.wall_excess_k.max()) > 20.0
     assert float(floor.held.max()) == 0.0

@@ -11,6 +11,7 @@ from core.geometry import Box, looking_along_y
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.result import Solution
+from core.room.answer import solution
 from core.room.observe import observations
 from core.room.rounds import coarse_fit, fine_fit, misfit_ratio
 from core.room.runs import Derivatives
@@ -178,7 +179,7 @@ def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothi
 ):
     patch = Patch(wall="z_min", lower_m=(1.2, 0.8), upper_m=(1.6, 1.2))
     openings = scene(
-        dataclasses.replace(SUPPLY, temperature_k=292.15, velocity_m_s=(0.1, 0.0, 0.0))
+        dataclasses.replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))
     ).boundary[:2]
     heater = (Heater(patch=patch, temperature_k=343.15),) if heated else ()
     there = replace(scene(SUPPLY), boundary=(*openings, *heater))
@@ -194,3 +195,26 @@ def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothi
         strips = [moved[f"heater_excess_k[{n}]"] for n in range(5)]
         assert np.argmax(strips) == 3
         assert strips[3] > 1.0
+
+
+def test_a_level_that_thermometers_moved_is_doubted_by_half_of_that(truth: Solution):
+    problem = measured(scene(SUPPLY), truth, 1e-5)
+    fitted = fitted_room(begin(problem, SETTINGS, lambda _: None), problem, SETTINGS, lambda _: None)
+    # As if parameters alone had made a room 2 K colder than the plane says.
+    colder = eqx.tree_at(lambda s: s.before.seen.excess_k, fitted, fitted.before.seen.excess_k - 2.0)
+    own, doubted = (solution(s, 0.0, use_images=True) for s in (fitted, colder))
+
+    inside = (slice(1, -1),) * 3
+    assert own.temperature_std_k is not None
+    assert doubted.temperature_std_k is not None
+    assert np.median(own.temperature_std_k[inside]) < 0.5
+    assert doubted.temperature_std_k[inside].min() > 0.8
+
+
+def test_air_of_one_temperature_is_solved_as_well():
+    supply = dataclasses.replace(SUPPLY, temperature_k=293.15)
+    found = solve_room(Problem(scene(supply), ()), SETTINGS)
+
+    np.testing.assert_allclose(found.temperature_k, 293.15, atol=1e-3)
+    assert np.all(np.isfinite(found.temperature_std_k))
+    assert float(np.abs(found.velocity_m_s).max()) > 0.1
