@@ -58,6 +58,7 @@ def deviation(
     stacked = np.stack(derivatives) if derivatives else np.zeros((0, *represented.grid.shape))
     after = np.sum(np.tensordot(roots.T, stacked, axes=1) ** 2, axis=0) + extra[1]
     before = np.sum(stacked**2, axis=0) + extra[0]
-    left = represented.deviation() ** 2
+    # Where nothing is open, nothing is left to inform.
+    left = represented.deviation() ** 2 + np.finfo(np.float32).tiny
     informed = 1.0 - (after + left) / (before + left)
     return Deviation(np.sqrt(after + left), np.clip(informed, 0.0, 1.0))

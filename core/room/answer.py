@@ -24,7 +24,7 @@ _SHARES = {"excess_k": (0.2, 1.0, 0.2), "pressure_m2_s2": (0.3, 2.0, 5.0), "velo
 # A level that thermometers moved is doubted by half of that: they stand in a few places, of which the room was wrong.
 _DOUBT = 0.5
 # Of c, where one guessed viscosity stands for all air: images that a map of it explains do not make it the right one.
-_GUESSED_VISCOSITY = 8.0
+_GUESSED_VISCOSITY = {"excess_k": 8.0, "pressure_m2_s2": 1.0, "velocity_m_s": 2.0}
 
 
 class Solved(eqx.Module):
@@ -141,6 +141,6 @@ def _deviation(
             between[0] = between[0] - between[0].mean((0, 1))
     a, c, b = _SHARES[name]
     if float(solved.prior.std.log_viscosity.max()) > 0:
-        c *= _GUESSED_VISCOSITY
+        c *= _GUESSED_VISCOSITY[name]
     represented = Represented(between[0], between[1], scale, (a, c * share, b * share))
     return deviation(moved, solved.posterior.covariance, represented, extra)
