@@ -47,9 +47,7 @@ def with_suspected_heaters(problem: Problem) -> Problem:
 
 def unexplained_as_stated(begun: Begun, data: Observations) -> bool:
     """Whether the derivatives of all that may be wrong leave more of the images than a room without its heat may."""
-    return bool(begun.prior.unknown_walls()) and _left(
-        begun, data, np.ones(len(begun.prior.active()), bool)
-    ) > (_EXPLAINED)
+    return _left(begun, data, np.ones(len(begun.prior.active()), bool)) > _EXPLAINED
 
 
 def explained_by_strips(suspected: Begun, data: Observations) -> bool:

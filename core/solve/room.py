@@ -89,9 +89,11 @@ def finish(
 
 
 def with_sources(begun: Begun, problem: Problem, settings: RoomSettings, tell: Event) -> Begun:
-    """The room as it was begun; with heat that nobody stated where the images cannot be explained otherwise."""
+    """The room as it was begun; with heat that nobody stated where unknown walls cannot explain the images."""
+    if not settings.use_images or not begun.prior.unknown_walls():
+        return begun
     data = data_of(begun, problem, settings)
-    if not settings.use_images or not unexplained_as_stated(begun, data):
+    if not unexplained_as_stated(begun, data):
         return begun
     suspected = begin(with_suspected_heaters(begun.problem), settings, tell, begun.coarse.closure)
     return suspected if explained_by_strips(suspected, data) else begun

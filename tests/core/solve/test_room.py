@@ -1,4 +1,3 @@
-import dataclasses
 from dataclasses import replace
 from typing import Literal
 
@@ -83,7 +82,7 @@ def measured(where: Scene, truth: Solution, noise_px: float) -> Problem:
 
 
 def test_images_repair_a_supply_that_was_entered_wrongly(truth: Solution):
-    wrong = dataclasses.replace(SUPPLY, temperature_k=305.15, velocity_m_s=(0.48, 0.0, 0.0))
+    wrong = replace(SUPPLY, temperature_k=305.15, velocity_m_s=(0.48, 0.0, 0.0))
     problem = measured(scene(wrong), truth, 1e-5)
 
     found = solve_room(problem, SETTINGS)
@@ -104,14 +103,14 @@ def test_images_repair_a_supply_that_was_entered_wrongly(truth: Solution):
 
 
 def test_derivatives_that_point_the_wrong_way_leave_a_room_no_worse_than_stated(truth: Solution):
-    wrong = dataclasses.replace(SUPPLY, temperature_k=304.15, velocity_m_s=(0.44, 0.0, 0.0))
+    wrong = replace(SUPPLY, temperature_k=304.15, velocity_m_s=(0.44, 0.0, 0.0))
     problem = measured(scene(wrong), truth, 1e-5)
     begun = begin(problem, SETTINGS, lambda _: None)
     data = observations(problem, (SETTINGS.vertices,) * 3)
     turned = eqx.tree_at(lambda d: d.steps, begun.derivatives, -begun.derivatives.steps)
     told: list[dict] = []
     vector = np.zeros(len(begun.prior.active()))
-    settings = dataclasses.replace(SETTINGS, rounds=2, final_s=10.0)
+    settings = replace(SETTINGS, rounds=2, final_s=10.0)
     best, _ = fine_fit(
         begun.fine, begun.prior, data, vector, begun.first, turned, lambda _: turned, settings, told.append
     )
@@ -125,9 +124,9 @@ def test_derivatives_are_made_again_where_unknown_walls_have_moved(truth: Soluti
     where = scene(SUPPLY)
     if unknown:
         openings = tuple(part for part in where.boundary if not isinstance(part, Wall))
-        where = dataclasses.replace(where, boundary=openings)
+        where = replace(where, boundary=openings)
     problem = measured(where, truth, 1e-5)
-    settings = dataclasses.replace(SETTINGS, rounds=3, again=1, straight_walls=0.0, fine_step=0.0)
+    settings = replace(SETTINGS, rounds=3, again=1, straight_walls=0.0, fine_step=0.0)
     begun = begin(problem, settings, lambda _: None)
     data = observations(begun.problem, (settings.vertices,) * 3)
     moved_to: list[np.ndarray] = []
@@ -178,9 +177,7 @@ def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothi
     heated: bool,
 ):
     patch = Patch(wall="z_min", lower_m=(1.2, 0.8), upper_m=(1.6, 1.2))
-    openings = scene(
-        dataclasses.replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))
-    ).boundary[:2]
+    openings = scene(replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))).boundary[:2]
     heater = (Heater(patch=patch, temperature_k=343.15),) if heated else ()
     there = replace(scene(SUPPLY), boundary=(*openings, *heater))
     entered = replace(there, boundary=openings)
@@ -212,7 +209,7 @@ def test_a_level_that_thermometers_moved_is_doubted_by_half_of_that(truth: Solut
 
 
 def test_air_of_one_temperature_is_solved_as_well():
-    supply = dataclasses.replace(SUPPLY, temperature_k=293.15)
+    supply = replace(SUPPLY, temperature_k=293.15)
     found = solve_room(Problem(scene(supply), ()), SETTINGS)
 
     np.testing.assert_allclose(found.temperature_k, 293.15, atol=1e-3)
