@@ -11,11 +11,12 @@ viscosity, which nobody enters, keeps a Gaussian one: else it is let go in a wro
 import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.optimize import lsq_linear
 
 # Neighbours err together, and errors of grid and closure reach over whole jets: so many data count as one.
 _COHERENT = 12.0
 _STUDENT_NU = 3.0
-_LONGEST_STEP = 3.0
+LONGEST_STEP = 3.0
 
 
 class Posterior(eqx.Module):
@@ -34,8 +35,9 @@ def gauss_newton(
     firm: Bool[np.ndarray, " active"],
     *,
     trusting: bool = False,
+    longest: float = LONGEST_STEP,
 ) -> Posterior:
-    """One step from `vector`, where the data minus the prediction is `residual`; each parameter's is cut.
+    """One step from `vector`, where the data minus the prediction is `residual`; none moves by more than `longest`.
 
     `firm` parameters keep a Gaussian prior; `trusting` keeps that of all: for first steps, when the model is
     still far from the data.
@@ -46,12 +48,21 @@ def gauss_newton(
         prior = np.where(firm | trusting, 1.0, student)
         normal = (jacobian.T / variance) @ jacobian + np.diag(prior)
         gradient = (jacobian.T / variance) @ residual - prior * vector
-        step = np.linalg.solve(normal, gradient)
-        step = np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
-        new = vector + step
+        new = vector + bounded(normal, gradient, longest)
     data = normal - np.diag(prior)
     # A parameter that was let go is no more certain than its prior, were there no data; one near it no less.
     return Posterior(new, np.linalg.inv(data + np.eye(len(new))), np.sqrt(variance))
+
+
+def bounded(
+    normal: Float[np.ndarray, "active active"], gradient: Float[np.ndarray, " active"], longest: float
+) -> Float[np.ndarray, " active"]:
+    """The Gauss-Newton step, or the best one in which no parameter moves by more than `longest`.
+
+    Cut one by one, parameters that make up for one another would no longer do so.
+    """
+    root = np.linalg.cholesky(normal)
+    return lsq_linear(root.T, np.linalg.solve(root, gradient), bounds=(-longest, longest)).x
 
 
 def weighted_variance(

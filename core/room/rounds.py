@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from core.problem import Problem
-from core.room.fit import Posterior, gauss_newton, weighted_variance
+from core.room.fit import LONGEST_STEP, Posterior, gauss_newton, weighted_variance
 from core.room.hold import to_hold_k
 from core.room.observe import Observations
 from core.room.prior import Prior
@@ -19,11 +19,11 @@ from core.room.room import Room
 from core.room.runs import Attempt, Derivatives, Event, RoomSettings, attempt, perturbed
 
 Vector = Float[np.ndarray, " active"]
+Jacobian = Float[np.ndarray, "data active"]
 
-# A correction that leaves more than this of the least misfit so far did harm: the room before it is kept. Below
-# it, the room may only not have settled yet; what is given back leaves no more than its own wobble above the least.
+# A held room that leaves more than this of the misfit of the one before is not kept: less is a march's own wobble.
 # After so many rounds that take less than a hundredth off the misfit the derivatives have no more to say.
-_HARM, _GAIN, _PATIENCE, _WOBBLE = 1.5, 0.99, 2, 1.05
+_WOBBLE, _GAIN, _PATIENCE = 1.05, 0.99, 2
 
 
 class Begun(eqx.Module):
@@ -45,22 +45,18 @@ def coarse_fit(
 
     What the coarse grid gets wrong is taken from the fine one under the stated parameters, so that it moves none.
     Far from where it was made a Jacobian misleads: it is made anew after every `settings.straight` prior deviations.
-    Walls that nobody knows are left to the fine room: the coarse one's own errors would move them. Not so where
-    heat is suspected that nobody stated: without it the room is another one.
+    Walls that nobody knows are left to the fine room: the coarse one's own errors would move them.
     """
     coarse, prior, base, derivatives = begun.coarse, begun.prior, begun.base, begun.derivatives
     vector = linearised = np.zeros(len(prior.active()))
     finer = data.predicted(begun.first.seen) - data.predicted(base.seen)
-    suspected = prior.suspected().any()
-    moves = settings.use_images and (suspected or not prior.unknown_walls())
+    moves = settings.use_images and not prior.unknown_walls()
     rounds = settings.coarse_rounds if moves else 0
-    straight = settings.straight_walls if suspected else settings.straight
-    # Air above a heater is slow to follow its derivatives: what brings it any nearer is a step on the way.
-    worthwhile = 1.0 if suspected else settings.worthwhile
     for n in range(rounds):
         # Where the parameters have moved, half of what was taken off may be wrong.
+        jacobian = derivatives.per_deviation(data.predicted).T
         new = corrected(
-            vector, base, data, derivatives, 0.5 * finer, firm=prior.firm(), offset=finer, trusting=True
+            vector, base, data, jacobian, 0.5 * finer, firm=prior.firm(), offset=finer, trusting=True
         ).vector
         if farthest(new, vector) < settings.coarse_step:
             break
@@ -68,10 +64,10 @@ def coarse_fit(
         tried = attempt(coarse, where, base.flow.last, seconds, data.vertices, tell)
         left = misfit_ratio(data, tried, base, finer)
         tell({"coarse_round": n + 1.0, "misfit_left": left, **fitted(prior, new)})
-        if left > worthwhile:
+        if left > settings.worthwhile:
             break
         vector, base = new, tried
-        if farthest(vector, linearised) > straight:
+        if farthest(vector, linearised) > settings.straight:
             derivatives, linearised = perturbed(coarse, prior, vector, base, settings, data.vertices), vector
     if np.any(vector != linearised):
         derivatives = perturbed(coarse, prior, vector, base, settings, data.vertices)
@@ -103,63 +99,59 @@ def fine_fit(
 ) -> tuple[Fit, Derivatives]:
     """The fine room's parameters and best march, and the last derivatives; as stated without images.
 
-    Where walls are unknown those are `made_again` after every other round that moved far, `settings.again` times.
+    A room that is farther from the data than the one before is not gone on from: the next step is shorter. Where
+    walls are unknown derivatives are `made_again` after every other round that moved far, and where the old ones
+    have no more to say, `settings.again` times.
     """
-    best = least = Fit(Posterior(vector, np.eye(len(vector)), np.zeros(0)), first)
+    best = Fit(Posterior(vector, np.eye(len(vector)), np.zeros(0)), first)
     grid_difference = data.predicted(first.seen) - data.predicted(derivatives.start)
     stale, again, linearised = 0, settings.again if prior.unknown_walls() else 0, vector
+    reach, jacobian = LONGEST_STEP, derivatives.per_deviation(data.predicted).T
     for n in range(settings.rounds if settings.use_images else 0):
-        new, left = fine_round(
-            n, fine, prior, data, best, least, derivatives, grid_difference, settings, tell
-        )
-        if left > _HARM:
-            best = best.known_as(new)
-            break
-        step = farthest(new.posterior.vector, best.posterior.vector)
-        best, stale = new, 0 if left < _GAIN else stale + 1
-        least = new if left < 1.0 else least
-        if again > 0 and n % 2 == 1 and farthest(new.posterior.vector, linearised) > settings.straight_walls:
-            # Not from a room that went astray.
-            best = least.known_as(best) if left > _WOBBLE else best
-            again, linearised, stale = again - 1, best.posterior.vector, 0
+        new = fine_round(fine, prior, data, best, jacobian, grid_difference, reach, settings, tell)
+        left, moved = misfit_ratio(data, new.room, best.room), new.posterior.vector - best.posterior.vector
+        tell({"round": n + 1.0, "misfit_left": left, **fitted(prior, new.posterior.vector)})
+        change = data.predicted(new.room.seen) - data.predicted(best.room.seen)
+        jacobian = secant(jacobian, moved, change)
+        step = float(np.abs(moved).max(initial=0.0))
+        best, reach = (new, LONGEST_STEP) if left < 1.0 else (best.known_as(new), 0.5 * step)
+        stale = 0 if left < _GAIN else stale + 1
+        done = (step < settings.fine_step and left > _GAIN) or stale == _PATIENCE
+        away = farthest(best.posterior.vector, linearised)
+        if (
+            again > 0
+            and away > (settings.fine_step if done else settings.straight_walls)
+            and (done or n % 2 == 1)
+        ):
+            again, linearised, stale, reach = again - 1, best.posterior.vector, 0, LONGEST_STEP
             derivatives = made_again(linearised)
-        elif step < settings.fine_step or stale == _PATIENCE:
+            jacobian = derivatives.per_deviation(data.predicted).T
+        elif done:
             break
-    if misfit_ratio(data, best.room, least.room) > _WOBBLE:
-        best = least.known_as(best)
     return best, derivatives
 
 
 def fine_round(
-    n: int,
     fine: Room,
     prior: Prior,
     data: Observations,
     best: Fit,
-    least: Fit,
-    derivatives: Derivatives,
+    jacobian: Jacobian,
     grid_difference: Float[np.ndarray, " data"],
+    reach: float,
     settings: RoomSettings,
     tell: Event,
-) -> tuple[Fit, float]:
-    """One step from the best room and its march, half of it where all did harm; its misfit over the least one.
+) -> Fit:
+    """One step from the best room, in which no parameter moves by more than `reach`, and its march."""
+    where, firm = best.posterior.vector, prior.firm()
+    asked = corrected(where, best.room, data, jacobian, grid_difference, firm=firm, longest=reach)
+    parameters, flow = prior.parameters(asked.vector), best.room.flow.last
+    return Fit(asked, attempt(fine, parameters, flow, settings.refine_s, data.vertices, tell))
 
-    The derivatives are a coarser room's, so a step may be too long.
-    """
-    asked = corrected(best.posterior.vector, best.room, data, derivatives, grid_difference, firm=prior.firm())
-    new, left = best, np.inf
-    for share in (1.0, 0.5):
-        vector = best.posterior.vector + share * (asked.vector - best.posterior.vector)
-        flow = best.room.flow.last
-        tried = attempt(fine, prior.parameters(vector), flow, settings.refine_s, data.vertices, tell)
-        new, left = (
-            Fit(Posterior(vector, asked.covariance, asked.deviation), tried),
-            misfit_ratio(data, tried, least.room),
-        )
-        tell({"round": n + 2.0 - share, "misfit_left": left, **fitted(prior, vector)})
-        if left <= _HARM:
-            break
-    return new, left
+
+def secant(jacobian: Jacobian, moved: Vector, change: Float[np.ndarray, " data"]) -> Jacobian:
+    """The Jacobian that agrees with what a move did, as near to the old one as can be (Broyden 1965)."""
+    return jacobian + np.outer(change - jacobian @ moved, moved) / max(float(moved @ moved), 1e-12)
 
 
 def held_fit(
@@ -188,19 +180,19 @@ def corrected(
     vector: Vector,
     best: Attempt,
     data: Observations,
-    derivatives: Derivatives,
+    jacobian: Jacobian,
     grid_difference: Float[np.ndarray, " data"],
     *,
     firm: Bool[np.ndarray, " active"],
     offset: Float[np.ndarray, " data"] | float = 0.0,
     trusting: bool = False,
+    longest: float = LONGEST_STEP,
 ) -> Posterior:
     """One Gauss-Newton step from `vector` by the misfit of `best`, `offset` added to what it shows."""
     values, variance, group = data.values()
-    jacobian = derivatives.per_deviation(data.predicted).T
     residual = values - data.predicted(best.seen) - offset
     weights = weighted_variance(variance, group, residual, grid_difference)
-    return gauss_newton(vector, residual, weights, jacobian, firm, trusting=trusting)
+    return gauss_newton(vector, residual, weights, jacobian, firm, trusting=trusting, longest=longest)
 
 
 def misfit_ratio(

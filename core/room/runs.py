@@ -28,7 +28,7 @@ Event = Callable[[dict[str, float]], object]
 # Walls that nobody knows may be off by half the supply's excess, and jets swerve: two deviations to one side
 # point where 0.25 do to 0.34-0.66 (cosine, shifts of case A), half of one to 0.77-0.94.
 # So does air above a heater: one of 60 K is another room, one of 10 K is blown away by the supply.
-_DIFFERENCE, _WALLS_DIFFERENCE, _SUSPECTED_DIFFERENCE = 2.0, 0.3, 1.5
+_DIFFERENCE, _WALLS_DIFFERENCE, _SUSPECTED_DIFFERENCE = 2.0, 0.3, 1.0
 
 # Steps a cell of the room's edge and second of the reference room, which takes half as many: a room whose
 # air turns out far faster than what was stated about it must not take hours.

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from core.problem import Problem
+from core.room.balance import outflow_excess_k
 from core.room.fit import Posterior
 from core.room.observe import Observations
 from core.room.openings import stated_walls
@@ -46,7 +47,7 @@ def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list
     for n, heater in enumerate(heaters):
         by_k = float(fitted.heater_excess_k[n] - prior.mean.heater_excess_k[n])
         if isinstance(heater, SuspectedHeater):
-            said += suspicion(heater, by_k)
+            said += suspicion(heater, float(fitted.heater_excess_k[n]) - (outflow_excess_k(problem) or 0.0))
         elif f"heater_excess_k[{n}]" in believed:
             said.append(
                 f"The measurements say that the heater on {heater.patch.wall} is "
@@ -62,7 +63,7 @@ def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list
 
 
 def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
-    """What the images say of a strip of floor, where it is worth saying."""
+    """What the images say of a strip of floor `by_k` warmer than the air, where it is worth saying."""
     if abs(by_k) < _SUSPICIOUS_K:
         return []
     lower, upper = heater.patch.lower_m, heater.patch.upper_m

@@ -1,35 +1,83 @@
-"""Heat that nobody stated: warm strips of the floor, where the images ask for them.
+"""Heat that nobody stated: a warm strip of the floor, where the images ask for one.
 
-Where walls are unknown, so is whether a heater stands on one. A room that no wall's temperature, supply or
-closure brings near the images is given strips of floor below the middle of the view, one beside the other, each
-with a temperature of its own: where the air rises the images show, how deep in the room they do not.
+Where walls are unknown, so is whether a heater stands on one. A room that no wall's temperature and no supply brings
+near the images is marched with a panel on one strip of floor after the other, below the middle of the view,
+each warmer until the images like it no better: where the air rises they show, how deep in the room they do not. Air
+above a heater is another flow than without, so marches are compared and no derivatives. The best strip is given to
+the fit as a heater whose heat is half known, between two neighbours that may share it.
 """
 
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
 
+import equinox as eqx
 import numpy as np
-from jaxtyping import Bool
 
 from core.problem import Problem
 from core.room.balance import outflow_excess_k
-from core.room.fit import gauss_newton, weighted_variance
 from core.room.observe import Observations
 from core.room.openings import share_area
-from core.room.rounds import Begun
-from core.room.setup import SuspectedHeater
+from core.room.prior import room_prior
+from core.room.room import Room, room
+from core.room.rounds import Begun, misfit_ratio
+from core.room.runs import Event, RoomSettings, attempt
+from core.room.setup import RoomParameters, SuspectedHeater
 from core.scene import Heater, Inlet, Outlet, Patch
 
 _STRIPS, _DEPTH_SHARE = 5, 0.2
-# At a heater's coefficient so many kelvin are some 60 W/m2.
-_STRIP_STD_K = 20.0
-# A room whose derivatives leave less than this of the images has its heat where it was stated; strips are kept
-# where they leave less than that share of what the room leaves without them.
-_EXPLAINED, _WORTHWHILE = 0.55, 0.8
+# At a heater's coefficient 20 K are some 60 W/m2: from a few people's worth to more than any panel's.
+_LADDER_K = (15.0, 30.0, 60.0, 120.0)
+_STD_SHARE = 0.5
+# A strip is tried by a fit where it alone leaves less than this of the misfit of the room without it.
+_WORTHWHILE = 0.8
 
 
-def with_suspected_heaters(problem: Problem) -> Problem:
-    """The problem with strips of floor whose temperature nobody knows, wherever no other patch lies."""
+def with_suspected_heat(
+    begun: Begun, data: Observations, settings: RoomSettings, tell: Event
+) -> Problem | None:
+    """The problem with the strip of floor whose heat the images like best, and its neighbours; None for no strip."""
+    strips = floor_strips(begun.problem)
+    cold = with_heaters(begun.problem, strips)
+    coarse = room(cold.scene, settings.coarse_cells, begun.coarse.closure)
+    mean = room_prior(cold, coarse.layout).mean
+    before = len(mean.heater_excess_k) - len(strips)
+
+    def climb(strip: int) -> tuple[float, float]:
+        return climbed(before + strip, coarse, mean, begun, data, settings)
+
+    with ThreadPoolExecutor(settings.threads) as pool:
+        climbs = list(pool.map(climb, range(len(strips))))
+    if min((left for left, _ in climbs), default=1.0) > _WORTHWHILE:
+        return None
+    best = int(np.argmin([left for left, _ in climbs]))
+    left, heat_k = climbs[best]
+    tell({"suspected_k": heat_k, "misfit_left": left})
+    warm = replace(strips[best], temperature_k=strips[best].temperature_k + heat_k)
+    beside = [s for s in strips if adjoin(s, warm)]
+    return with_heaters(
+        begun.problem, [replace(s, temperature_std_k=_STD_SHARE * heat_k) for s in (warm, *beside)]
+    )
+
+
+def climbed(
+    heater: int, coarse: Room, mean: RoomParameters, begun: Begun, data: Observations, settings: RoomSettings
+) -> tuple[float, float]:
+    """Least misfit with this heater warm, over that of the room without, and by how many kelvin it was warm."""
+    least, best_k, flow = np.inf, 0.0, begun.base.flow.last
+    for heat_k in _LADDER_K:
+        warm = eqx.tree_at(lambda p: p.heater_excess_k, mean, mean.heater_excess_k.at[heater].add(heat_k))
+        tried = attempt(coarse, warm, flow, settings.restart_s, data.vertices, lambda _: None)
+        left = misfit_ratio(data, tried, begun.base)
+        if left > least:
+            break
+        least, best_k, flow = left, heat_k, tried.flow.last
+    return least, best_k
+
+
+def floor_strips(problem: Problem) -> list[SuspectedHeater]:
+    """Strips of floor as warm as the air, wherever no other patch lies."""
     box, scene = problem.scene.room, problem.scene
     edges_m = np.linspace(box.lower_m[0], box.upper_m[0], _STRIPS + 1)
     middle_m, half_m = box.centre_m[1], 0.5 * _DEPTH_SHARE * box.size_m[1]
@@ -40,30 +88,17 @@ def with_suspected_heaters(problem: Problem) -> Problem:
         lower, upper = (float(low_m), middle_m - half_m), (float(high_m), middle_m + half_m)
         patch = Patch(wall="z_min", lower_m=lower, upper_m=upper)
         if not any(share_area(patch, other) for other in taken):
-            strips.append(SuspectedHeater(patch=patch, temperature_k=air_k, temperature_std_k=_STRIP_STD_K))
-    boundary = (*scene.boundary, *strips)
-    return Problem(replace(scene, boundary=boundary), problem.shifts, problem.planes, problem.sensors)
+            strips.append(SuspectedHeater(patch=patch, temperature_k=air_k))
+    return strips
 
 
-def unexplained_as_stated(begun: Begun, data: Observations) -> bool:
-    """Whether the derivatives of all that may be wrong leave more of the images than a room without its heat may."""
-    return _left(begun, data, np.ones(len(begun.prior.active()), bool)) > _EXPLAINED
+def adjoin(one: Heater, other: Heater) -> bool:
+    """Whether two strips lie side by side."""
+    ends = (one.patch.lower_m[0], one.patch.upper_m[0]), (other.patch.lower_m[0], other.patch.upper_m[0])
+    return ends[0][1] == ends[1][0] or ends[1][1] == ends[0][0]
 
 
-def explained_by_strips(suspected: Begun, data: Observations) -> bool:
-    """Whether strips bring the room much nearer to the images than everything else does."""
-    stated = ~suspected.prior.suspected()
-    return _left(suspected, data, np.ones_like(stated)) < _WORTHWHILE * _left(suspected, data, stated)
-
-
-def _left(begun: Begun, data: Observations, moved: Bool[np.ndarray, " active"]) -> float:
-    """Share (rms) of the measured shifts that one step of the `moved` parameters leaves, by the derivatives."""
-    values, variance, group = data.values()
-    seen = data.predicted(begun.first.seen)
-    finer = seen - data.predicted(begun.base.seen)
-    jacobian = begun.derivatives.per_deviation(data.predicted).T * moved
-    weights = weighted_variance(variance, group, values - seen, 0.5 * finer)
-    start = np.zeros(len(moved))
-    step = gauss_newton(start, values - seen, weights, jacobian, begun.prior.firm(), trusting=True).vector
-    left, shifts = values - seen - jacobian @ step, group == 0
-    return float(np.linalg.norm(left[shifts]) / max(float(np.linalg.norm(values[shifts])), 1e-30))
+def with_heaters(problem: Problem, heaters: Sequence[Heater]) -> Problem:
+    """The problem with these heaters beside what is stated."""
+    boundary = (*problem.scene.boundary, *heaters)
+    return Problem(replace(problem.scene, boundary=boundary), problem.shifts, problem.planes, problem.sensors)
