@@ -11,7 +11,6 @@ viscosity, which nobody enters, keeps a Gaussian one: else it is let go in a wro
 import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.optimize import lsq_linear
 
 # Neighbours err together, and errors of grid and closure reach over whole jets: so many data count as one.
 _COHERENT = 12.0
@@ -35,9 +34,12 @@ def gauss_newton(
     firm: Bool[np.ndarray, " active"],
     *,
     trusting: bool = False,
-    longest: float = LONGEST_STEP,
+    reach: float | None = None,
 ) -> Posterior:
-    """One step from `vector`, where the data minus the prediction is `residual`; none moves by more than `longest`.
+    """One step from `vector`, where the data minus the prediction is `residual`; each parameter's is cut.
+
+    Few parameters are cut one by one, which lets an entry that is far off move all the way. Many that make up for one
+    another no longer would: they are damped until none moves by more than `reach`.
 
     `firm` parameters keep a Gaussian prior; `trusting` keeps that of all: for first steps, when the model is
     still far from the data.
@@ -48,21 +50,22 @@ def gauss_newton(
         prior = np.where(firm | trusting, 1.0, student)
         normal = (jacobian.T / variance) @ jacobian + np.diag(prior)
         gradient = (jacobian.T / variance) @ residual - prior * vector
-        new = vector + bounded(normal, gradient, longest)
+        whole = np.clip(np.linalg.solve(normal, gradient), -LONGEST_STEP, LONGEST_STEP)
+        new = vector + (whole if reach is None else damped(normal, gradient, reach))
     data = normal - np.diag(prior)
     # A parameter that was let go is no more certain than its prior, were there no data; one near it no less.
     return Posterior(new, np.linalg.inv(data + np.eye(len(new))), np.sqrt(variance))
 
 
-def bounded(
+def damped(
     normal: Float[np.ndarray, "active active"], gradient: Float[np.ndarray, " active"], longest: float
 ) -> Float[np.ndarray, " active"]:
-    """The Gauss-Newton step, or the best one in which no parameter moves by more than `longest`.
-
-    Cut one by one, parameters that make up for one another would no longer do so.
-    """
-    root = np.linalg.cholesky(normal)
-    return lsq_linear(root.T, np.linalg.solve(root, gradient), bounds=(-longest, longest)).x
+    """The Gauss-Newton step, damped (Levenberg 1944) until no parameter moves by more than `longest`."""
+    damping, step = 0.0, np.linalg.solve(normal, gradient)
+    while np.abs(step).max(initial=0.0) > longest:
+        damping = max(2.0 * damping, 0.1)
+        step = np.linalg.solve(normal + damping * np.eye(len(step)), gradient)
+    return step
 
 
 def weighted_variance(

@@ -1,29 +1,26 @@
 """A room's parameters, corrected round by round: on a coarse grid while that pays, then on a fine one.
 
-One restart a parameter says what each would change; the misfit with the data moves them by Gauss-Newton. At
-last the room is held at the temperatures that measurements say.
+One restart a parameter says what each would change; the misfit with the data moves them by Gauss-Newton. Where walls
+are unknown, `core.room.search` does so. At last the room is held at the temperatures that measurements say.
 """
-
-from collections.abc import Callable
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from core.problem import Problem
-from core.room.fit import LONGEST_STEP, Posterior, gauss_newton, weighted_variance
+from core.room.fit import Posterior
 from core.room.hold import to_hold_k
 from core.room.observe import Observations
 from core.room.prior import Prior
 from core.room.room import Room
 from core.room.runs import Attempt, Derivatives, Event, RoomSettings, attempt, perturbed
+from core.room.steps import Vector, corrected, farthest, fitted, misfit_ratio
 
-Vector = Float[np.ndarray, " active"]
-Jacobian = Float[np.ndarray, "data active"]
-
-# A held room that leaves more than this of the misfit of the one before is not kept: less is a march's own wobble.
+# A correction that leaves more than this of the least misfit so far did harm: the room before it is kept. Below
+# it, the room may only not have settled yet; what is given back leaves no more than its own wobble above the least.
 # After so many rounds that take less than a hundredth off the misfit the derivatives have no more to say.
-_WOBBLE, _GAIN, _PATIENCE = 1.05, 0.99, 2
+_HARM, GAIN, PATIENCE, _WOBBLE = 1.5, 0.99, 2, 1.05
 
 
 class Begun(eqx.Module):
@@ -93,65 +90,64 @@ def fine_fit(
     vector: Vector,
     first: Attempt,
     derivatives: Derivatives,
-    made_again: Callable[[Vector], Derivatives],
     settings: RoomSettings,
     tell: Event,
-) -> tuple[Fit, Derivatives]:
-    """The fine room's parameters and best march, and the last derivatives; as stated without images.
+) -> Fit:
+    """The fine room's parameters and best march; as stated without images.
 
-    A room that is farther from the data than the one before is not gone on from: the next step is shorter. Where
-    walls are unknown derivatives are `made_again` after every other round that moved far, and where the old ones
-    have no more to say, `settings.again` times.
+    For few parameters that are nearly right: what is left to move is little more than a march's wobble.
     """
-    best = Fit(Posterior(vector, np.eye(len(vector)), np.zeros(0)), first)
+    best = least = Fit(Posterior(vector, np.eye(len(vector)), np.zeros(0)), first)
     grid_difference = data.predicted(first.seen) - data.predicted(derivatives.start)
-    stale, again, linearised = 0, settings.again if prior.unknown_walls() else 0, vector
-    reach, jacobian = LONGEST_STEP, derivatives.per_deviation(data.predicted).T
+    stale = 0
     for n in range(settings.rounds if settings.use_images else 0):
-        new = fine_round(fine, prior, data, best, jacobian, grid_difference, reach, settings, tell)
-        left, moved = misfit_ratio(data, new.room, best.room), new.posterior.vector - best.posterior.vector
-        tell({"round": n + 1.0, "misfit_left": left, **fitted(prior, new.posterior.vector)})
-        change = data.predicted(new.room.seen) - data.predicted(best.room.seen)
-        jacobian = secant(jacobian, moved, change)
-        step = float(np.abs(moved).max(initial=0.0))
-        best, reach = (new, LONGEST_STEP) if left < 1.0 else (best.known_as(new), 0.5 * step)
-        stale = 0 if left < _GAIN else stale + 1
-        done = (step < settings.fine_step and left > _GAIN) or stale == _PATIENCE
-        away = farthest(best.posterior.vector, linearised)
-        if (
-            again > 0
-            and away > (settings.fine_step if done else settings.straight_walls)
-            and (done or n % 2 == 1)
-        ):
-            again, linearised, stale, reach = again - 1, best.posterior.vector, 0, LONGEST_STEP
-            derivatives = made_again(linearised)
-            jacobian = derivatives.per_deviation(data.predicted).T
-        elif done:
+        new, left = fine_round(
+            n, fine, prior, data, best, least, derivatives, grid_difference, settings, tell
+        )
+        if left > _HARM:
+            best = best.known_as(new)
             break
-    return best, derivatives
+        step = farthest(new.posterior.vector, best.posterior.vector)
+        best, stale = new, 0 if left < GAIN else stale + 1
+        least = new if left < 1.0 else least
+        if step < settings.fine_step or stale == PATIENCE:
+            break
+    if misfit_ratio(data, best.room, least.room) > _WOBBLE:
+        best = least.known_as(best)
+    return best
 
 
 def fine_round(
+    n: int,
     fine: Room,
     prior: Prior,
     data: Observations,
     best: Fit,
-    jacobian: Jacobian,
+    least: Fit,
+    derivatives: Derivatives,
     grid_difference: Float[np.ndarray, " data"],
-    reach: float,
     settings: RoomSettings,
     tell: Event,
-) -> Fit:
-    """One step from the best room, in which no parameter moves by more than `reach`, and its march."""
-    where, firm = best.posterior.vector, prior.firm()
-    asked = corrected(where, best.room, data, jacobian, grid_difference, firm=firm, longest=reach)
-    parameters, flow = prior.parameters(asked.vector), best.room.flow.last
-    return Fit(asked, attempt(fine, parameters, flow, settings.refine_s, data.vertices, tell))
+) -> tuple[Fit, float]:
+    """One step from the best room and its march, half of it where all did harm; its misfit over the least one.
 
-
-def secant(jacobian: Jacobian, moved: Vector, change: Float[np.ndarray, " data"]) -> Jacobian:
-    """The Jacobian that agrees with what a move did, as near to the old one as can be (Broyden 1965)."""
-    return jacobian + np.outer(change - jacobian @ moved, moved) / max(float(moved @ moved), 1e-12)
+    The derivatives are a coarser room's, so a step may be too long.
+    """
+    jacobian = derivatives.per_deviation(data.predicted).T
+    asked = corrected(best.posterior.vector, best.room, data, jacobian, grid_difference, firm=prior.firm())
+    new, left = best, np.inf
+    for share in (1.0, 0.5):
+        vector = best.posterior.vector + share * (asked.vector - best.posterior.vector)
+        flow = best.room.flow.last
+        tried = attempt(fine, prior.parameters(vector), flow, settings.refine_s, data.vertices, tell)
+        new, left = (
+            Fit(Posterior(vector, asked.covariance, asked.deviation), tried),
+            misfit_ratio(data, tried, least.room),
+        )
+        tell({"round": n + 2.0 - share, "misfit_left": left, **fitted(prior, vector)})
+        if left <= _HARM:
+            break
+    return new, left
 
 
 def held_fit(
@@ -174,42 +170,3 @@ def held_fit(
         left = misfit_ratio(data, held, before)
         tell({"held_s": seconds, "misfit_left": left})
     return before if left > _WOBBLE else held
-
-
-def corrected(
-    vector: Vector,
-    best: Attempt,
-    data: Observations,
-    jacobian: Jacobian,
-    grid_difference: Float[np.ndarray, " data"],
-    *,
-    firm: Bool[np.ndarray, " active"],
-    offset: Float[np.ndarray, " data"] | float = 0.0,
-    trusting: bool = False,
-    longest: float = LONGEST_STEP,
-) -> Posterior:
-    """One Gauss-Newton step from `vector` by the misfit of `best`, `offset` added to what it shows."""
-    values, variance, group = data.values()
-    residual = values - data.predicted(best.seen) - offset
-    weights = weighted_variance(variance, group, residual, grid_difference)
-    return gauss_newton(vector, residual, weights, jacobian, firm, trusting=trusting, longest=longest)
-
-
-def misfit_ratio(
-    data: Observations, new: Attempt, old: Attempt, offset: Float[np.ndarray, " data"] | float = 0.0
-) -> float:
-    """Rms misfit of one attempt over another's, each kind of data weighted by the old one's."""
-    values, variance, group = data.values()
-    after, before = (values - data.predicted(a.seen) - offset for a in (new, old))
-    weights = weighted_variance(variance, group, before, before)
-    return float(np.sqrt(np.sum(after**2 / weights) / max(np.sum(before**2 / weights), 1e-30)))
-
-
-def farthest(one: Vector, other: Vector) -> float:
-    """The largest difference of two sets of parameters, in prior deviations."""
-    return float(np.abs(one - other).max(initial=0.0))
-
-
-def fitted(prior: Prior, vector: Vector) -> dict[str, float]:
-    """Parameters by name, in deviations from their priors."""
-    return dict(zip(prior.names(), (float(v) for v in vector), strict=True))

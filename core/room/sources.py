@@ -21,9 +21,10 @@ from core.room.observe import Observations
 from core.room.openings import share_area
 from core.room.prior import room_prior
 from core.room.room import Room, room
-from core.room.rounds import Begun, misfit_ratio
+from core.room.rounds import Begun
 from core.room.runs import Event, RoomSettings, attempt
 from core.room.setup import RoomParameters, SuspectedHeater
+from core.room.steps import misfit_ratio
 from core.scene import Heater, Inlet, Outlet, Patch
 
 _STRIPS, _DEPTH_SHARE = 5, 0.2

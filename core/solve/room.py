@@ -11,30 +11,27 @@ import numpy as np
 
 from core.problem import Problem
 from core.result import Solution
-from core.room.answer import Solved, solution, unexplained
+from core.room.answer import Solved, solution
 from core.room.observe import Observations, observations
 from core.room.plane_openings import with_plane_openings
 from core.room.prior import room_prior
-from core.room.room import Room, carried_over, closure_name, room
-from core.room.rounds import Begun, Vector, coarse_fit, fine_fit, held_fit
+from core.room.rivals import HEAT_WORTHWHILE, left_over, promising_closure, suspected_heat
+from core.room.room import carried_over, closure_name, room
+from core.room.rounds import Begun, coarse_fit, fine_fit, held_fit
 from core.room.runs import (
     Attempt,
     Derivatives,
     Event,
     RoomSettings,
     attempt,
-    other_closure,
     otherwise_closed,
     perturbed,
     settled,
 )
+from core.room.search import fine_search
 from core.room.sentences import another_closure
 from core.room.setup import RoomLayout
-from core.room.sources import with_suspected_heat
-
-# Rooms whose closure is right leave 8 to 22 % of the shifts (rms) at 48 cells, those under another 29 to 40, those
-# without a heater of theirs 60: it is kept where it takes a fifth off that.
-_MUCH, _MOST, _WORTHWHILE = 0.25, 0.45, 0.8
+from core.room.steps import Vector
 
 
 def solve_room(
@@ -85,9 +82,8 @@ def finish(
     if warm is not None:
         rival = begin(warm, settings, tell, begun.coarse.closure)
         again = fitted_room(rival, problem, settings, tell)
-        begun, solved = (
-            (rival, again) if left_over(again) < _WORTHWHILE * left_over(solved) else (begun, solved)
-        )
+        if left_over(again) < HEAT_WORTHWHILE * left_over(solved):
+            begun, solved = rival, again
     name = promising_closure(solved, begun.coarse) if settings.use_images else None
     if name is not None:
         again = fitted_room(begin(begun.problem, settings, tell, name), problem, settings, tell)
@@ -98,35 +94,11 @@ def finish(
     return solution(solved, time.perf_counter() - start_s, use_images=settings.use_images, notes=notes)
 
 
-def left_over(solved: Solved) -> float:
-    """Share (rms) of the measured shifts that a fitted room leaves."""
-    return unexplained(solved.data, solved.best.seen)
-
-
-def suspected_heat(solved: Solved, begun: Begun, settings: RoomSettings, tell: Event) -> Problem | None:
-    """The problem with heat that nobody stated, where unknown walls do not explain the images and it may."""
-    if not settings.use_images or not begun.prior.unknown_walls() or left_over(solved) < _MOST:
-        return None
-    return with_suspected_heat(begun, solved.data, settings, tell)
-
-
 def data_of(begun: Begun, problem: Problem, settings: RoomSettings) -> Observations:
     """The data of `problem`, as vertices of the room that was begun see them."""
     stated = begun.problem
     of = Problem(stated.scene, problem.shifts, stated.planes, stated.sensors)
     return observations(of, (settings.vertices, settings.vertices, settings.vertices))
-
-
-def promising_closure(solved: Solved, coarse: Room) -> str | None:
-    """The other closure, where nobody stated one and it may explain the images better than the fitted room; or None.
-
-    So it may where a coarse room under it leaves less of them, and where the fitted one leaves much.
-    """
-    if solved.problem.scene.flow.transport != "auto":
-        return None
-    left = left_over(solved)
-    worth = left > _MUCH or unexplained(solved.data, solved.other) < left
-    return other_closure(coarse) if worth else None
 
 
 def fitted_room(begun: Begun, problem: Problem, settings: RoomSettings, tell: Event) -> Solved:
@@ -144,7 +116,11 @@ def fitted_room(begun: Begun, problem: Problem, settings: RoomSettings, tell: Ev
     def made_again(where: Vector) -> Derivatives:
         return perturbed(coarse, prior, where, base, settings, vertices)
 
-    found, derivatives = fine_fit(fine, prior, data, vector, first, linearised, made_again, settings, tell)
+    derivatives = linearised
+    if settings.use_images and prior.unknown_walls():
+        found, derivatives = fine_search(fine, prior, data, first, linearised, made_again, settings, tell)
+    else:
+        found = fine_fit(fine, prior, data, vector, first, linearised, settings, tell)
     before = best = found.room
     if settings.use_images:
         best = held_fit(fine, prior, data, before, derivatives, settings, tell)

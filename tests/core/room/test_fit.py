@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from core.room.fit import gauss_newton
+from core.room.steps import secant
 
 
 def test_the_closure_is_not_let_go_in_a_wrong_supplys_place():
@@ -27,3 +28,29 @@ def test_where_all_are_trusted_both_move_alike():
 
     # 8 (2 - a - b) = a = b.
     assert found.vector == pytest.approx(np.full(2, 16.0 / 17.0))
+
+
+def test_a_damped_step_keeps_parameters_together_that_make_up_for_one_another():
+    # Data that see the difference of two parameters ten times better than their sum, both 50 deviations away.
+    jacobian = np.array([[10.0, -10.0], [1.0, 1.0]])
+    residual, variance = np.array([0.0, 100.0]), np.full(2, 1e-4)
+
+    def step(reach: float) -> np.ndarray:
+        firm = np.array([True, True])
+        return gauss_newton(np.zeros(2), residual, variance, jacobian, firm, reach=reach).vector
+
+    near, far = step(0.5), step(2.0)
+    for reached, reach in ((near, 0.5), (far, 2.0)):
+        assert 0.4 * reach < np.abs(reached).max() <= reach
+        assert reached[0] == pytest.approx(reached[1], rel=1e-3)
+
+
+def test_a_march_teaches_the_jacobian_its_own_move_and_nothing_else():
+    jacobian = np.arange(6.0).reshape(3, 2)
+    moved, change = np.array([1.0, 1.0]), np.array([4.0, 0.0, -2.0])
+
+    learned = secant(jacobian, moved, change)
+
+    np.testing.assert_allclose(learned @ moved, change)
+    across = np.array([1.0, -1.0])
+    np.testing.assert_allclose(learned @ across, jacobian @ across)
