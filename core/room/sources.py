@@ -28,7 +28,7 @@ from core.room.steps import misfit_ratio
 from core.scene import Heater, Inlet, Outlet, Patch
 
 _STRIPS, _DEPTH_SHARE = 5, 0.2
-# At a heater's coefficient 20 K are some 60 W/m2: from a few people's worth to more than any panel's.
+# At a heater's coefficient 20 K are some 60 W/m2, over about half a square metre: from a lamp to a radiator.
 _LADDER_K = (15.0, 30.0, 60.0, 120.0)
 _STD_SHARE = 0.5
 # A strip is tried by a fit where it alone leaves less than this of the misfit of the room without it.
