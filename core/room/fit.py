@@ -36,10 +36,10 @@ def gauss_newton(
     trusting: bool = False,
     reach: float | None = None,
 ) -> Posterior:
-    """One step from `vector`, where the data minus the prediction is `residual`; each parameter's is cut.
+    """One step from `vector`, where the data minus the prediction is `residual`.
 
-    Few parameters are cut one by one, which lets an entry that is far off move all the way. Many that make up for one
-    another no longer would: they are damped until none moves by more than `reach`.
+    Few parameters' steps are cut one by one, which lets an entry that is far off move all the way. Many
+    that make up for one another would no longer do so: they are damped until none moves by more than `reach`.
 
     `firm` parameters keep a Gaussian prior; `trusting` keeps that of all: for first steps, when the model is
     still far from the data.
@@ -50,8 +50,10 @@ def gauss_newton(
         prior = np.where(firm | trusting, 1.0, student)
         normal = (jacobian.T / variance) @ jacobian + np.diag(prior)
         gradient = (jacobian.T / variance) @ residual - prior * vector
-        whole = np.clip(np.linalg.solve(normal, gradient), -LONGEST_STEP, LONGEST_STEP)
-        new = vector + (whole if reach is None else damped(normal, gradient, reach))
+        if reach is None:
+            new = vector + np.clip(np.linalg.solve(normal, gradient), -LONGEST_STEP, LONGEST_STEP)
+        else:
+            new = vector + damped(normal, gradient, reach)
     data = normal - np.diag(prior)
     # A parameter that was let go is no more certain than its prior, were there no data; one near it no less.
     return Posterior(new, np.linalg.inv(data + np.eye(len(new))), np.sqrt(variance))

@@ -27,7 +27,7 @@ Event = Callable[[dict[str, float]], object]
 # half a deviation the wobble outweighs what 1 % of a supply does, and the fit of a wrong supply does not end.
 # Walls that nobody knows may be off by half the supply's excess, and jets swerve: two deviations to one side
 # point where 0.25 do to 0.34-0.66 (cosine, shifts of case A), half of one to 0.77-0.94.
-# So does air above a heater: one of 60 K is another room, one of 10 K is blown away by the supply.
+# Air above a suspected heater is moved by one deviation, half of the heat that marches found there.
 _DIFFERENCE, _WALLS_DIFFERENCE, _SUSPECTED_DIFFERENCE = 2.0, 0.3, 1.0
 
 # Steps a cell of the room's edge and second of the reference room, which takes half as many: a room whose
