@@ -202,8 +202,14 @@ def _inlet(inlet: dict[str, Any], volume: RoomVolume) -> Inlet:
         temperature_k=volume.ambient_k + float(inlet["dT"]),
         velocity_m_s=(float(inlet["U"]), 0.0, 0.0),
         turbulence_intensity=float(volume.case.get("TI", 0.1)),
-        length_scale_m=float(volume.case["lscale"]) if "lscale" in volume.case else None,
+        length_scale_m=_length_scale_m(inlet, volume),
     )
+
+
+def _length_scale_m(inlet: dict[str, Any], volume: RoomVolume) -> float | None:
+    """A case states it as a share of the patch's hydraulic diameter, as CFD programs' users do."""
+    share = volume.case.get("lscale")
+    return None if share is None else float(share) * _patch(inlet).hydraulic_diameter_m
 
 
 def _outlet(volume: RoomVolume) -> list[Outlet]:

@@ -141,13 +141,20 @@ class Patch:
                 "Give lower_m below upper_m along both axes of the wall, in metres."
             )
 
+    @property
+    def hydraulic_diameter_m(self) -> float:
+        """Four times the area over the circumference."""
+        one_m, other_m = (high - low for low, high in zip(self.lower_m, self.upper_m, strict=True))
+        return 2.0 * one_m * other_m / (one_m + other_m)
+
 
 @setting
 class Inlet:
     """Supply air through a patch; the standard deviations are the operator's uncertainty.
 
     `length_scale_m` is the mixing length of the supply's turbulence; None takes 0.07 of the patch's
-    hydraulic diameter.
+    hydraulic diameter. k-epsilon rooms set the dissipation beside an opening by themselves, so it moves
+    nothing there yet (`core.room.k_epsilon`).
     """
 
     kind: Literal["inlet"] = "inlet"

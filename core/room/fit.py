@@ -15,6 +15,8 @@ from jaxtyping import Bool, Float, Int
 # Neighbours err together, and errors of grid and closure reach over whole jets: so many data count as one.
 _COHERENT = 12.0
 _STUDENT_NU = 3.0
+# Kinds of data, as `core.room.observe` numbers them, whose neighbours err together.
+IMAGES, PLANES = 0, 1
 LONGEST_STEP = 3.0
 
 
@@ -75,16 +77,22 @@ def weighted_variance(
     group: Int[np.ndarray, " data"],
     residual: Float[np.ndarray, " data"],
     grid_difference: Float[np.ndarray, " data"],
+    *,
+    far: bool = False,
 ) -> Float[np.ndarray, " data"]:
     """Noise plus representation error of each datum, times the number of neighbours that err together.
 
-    The representation error of a kind of data is what two grids differ by, or the misfit where that is less.
+    The representation error of a kind of data is what two grids differ by, or the misfit where that is less. `far`
+    from the truth the images' derivatives are no better than their misfit: all of it counts, so that they ask for no
+    more than they can tell, and a stated supply or a thermometer holds against them.
     """
     total = np.zeros_like(variance)
     for g in np.unique(group):
         own = group == g
-        error = min(spread(residual[own]), spread(grid_difference[own]))
-        total[own] = (variance[own] + error**2) * (_COHERENT if g <= 1 else 1.0)
+        error = spread(residual[own])
+        if g != IMAGES or not far:
+            error = min(error, spread(grid_difference[own]))
+        total[own] = (variance[own] + error**2) * (_COHERENT if g in (IMAGES, PLANES) else 1.0)
     return total
 
 

@@ -121,9 +121,7 @@ def stated_walls(scene: Scene) -> dict[str, Wall | None]:
 
 def supply_turbulence(inlet: Inlet) -> tuple[float, float]:
     """k [m2/s2] and epsilon [m2/s3] of the supply."""
-    sides = [high - low for low, high in zip(inlet.patch.lower_m, inlet.patch.upper_m, strict=True)]
-    hydraulic_diameter_m = 2.0 * sides[0] * sides[1] / (sides[0] + sides[1])
-    length_m = inlet.length_scale_m or 0.07 * hydraulic_diameter_m
+    length_m = inlet.length_scale_m or 0.07 * inlet.patch.hydraulic_diameter_m
     speed = float(np.linalg.norm(inlet.velocity_m_s))
     k = 1.5 * (inlet.turbulence_intensity * speed) ** 2
     return k, C_MU**0.75 * k**1.5 / length_m

@@ -33,7 +33,7 @@ _WALL_HEAT_STD = 0.6
 _SHARED_HEAT_STD = 0.3
 # Spread of unknown walls: of their distance from the air, and at least of the supply's contrast.
 _WALL_SHARE, _LEAST_WALL_SHARE = 1.0, 0.2
-_HEATER_HEAT_M_S, _HEATER_HEAT_STD = 2.5e-3, 0.5
+_HEATER_HEAT_M_S, _HEATER_HEAT_STD = 2.5e-3, 0.6
 # A viscosity that the images may choose absorbs every other misfit and spoils u: k-epsilon keeps its own.
 _CLOSURE_STD, _SIMPLE_CLOSURE_STD = 0.12, 0.25
 # One viscosity for all air is no room's: where nobody stated its value either, the images may choose it from place

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from core.problem import Problem
 from core.room.fit import Posterior
+from core.room.heaters import heaters_by_march
 from core.room.hold import to_hold_k
 from core.room.observe import Observations
 from core.room.prior import Prior
@@ -42,14 +43,18 @@ def coarse_fit(
 
     What the coarse grid gets wrong is taken from the fine one under the stated parameters, so that it moves none.
     Far from where it was made a Jacobian misleads: it is made anew after every `settings.straight` prior deviations.
-    Walls that nobody knows are left to the fine room: the coarse one's own errors would move them.
+    What stated heaters give off is found before, by marches. Walls that nobody knows are left to the fine room: the
+    coarse one's own errors would move them.
     """
     coarse, prior, base, derivatives = begun.coarse, begun.prior, begun.base, begun.derivatives
     vector = linearised = np.zeros(len(prior.active()))
     finer = data.predicted(begun.first.seen) - data.predicted(base.seen)
     moves = settings.use_images and not prior.unknown_walls()
-    rounds = settings.coarse_rounds if moves else 0
-    for n in range(rounds):
+    if moves:
+        vector, base = heaters_by_march(coarse, prior, data, base, finer, settings, tell)
+    if np.any(vector):
+        derivatives, linearised = perturbed(coarse, prior, vector, base, settings, data.vertices), vector
+    for n in range(settings.coarse_rounds if moves else 0):
         # Where the parameters have moved, half of what was taken off may be wrong.
         jacobian = derivatives.per_deviation(data.predicted).T
         new = corrected(

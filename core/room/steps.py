@@ -24,10 +24,13 @@ def corrected(
     trusting: bool = False,
     reach: float | None = None,
 ) -> Posterior:
-    """One Gauss-Newton step from `vector` by the misfit of `best`, `offset` added to what it shows."""
+    """One Gauss-Newton step from `vector` by the misfit of `best`, `offset` added to what it shows.
+
+    One that may not reach farther than `reach` is a search's, still far from the truth.
+    """
     values, variance, group = data.values()
     residual = values - data.predicted(best.seen) - offset
-    weights = weighted_variance(variance, group, residual, grid_difference)
+    weights = weighted_variance(variance, group, residual, grid_difference, far=reach is not None)
     return gauss_newton(vector, residual, weights, jacobian, firm, trusting=trusting, reach=reach)
 
 

@@ -78,18 +78,17 @@ def finish(
     """
     solved = fitted_room(begun, problem, settings, tell)
     notes: tuple[str, ...] = ()
-    warm = suspected_heat(solved, begun, settings, tell)
-    if warm is not None:
-        rival = begin(warm, settings, tell, begun.coarse.closure)
-        again = fitted_room(rival, problem, settings, tell)
-        if left_over(again) < HEAT_WORTHWHILE * left_over(solved):
-            begun, solved = rival, again
     name = promising_closure(solved, begun.coarse) if settings.use_images else None
     if name is not None:
         again = fitted_room(begin(begun.problem, settings, tell, name), problem, settings, tell)
         if left_over(again) < left_over(solved):
             notes = (another_closure(name, left_over(again), begun.coarse.closure, left_over(solved)),)
             solved = again
+    warm = suspected_heat(solved, begun, settings, tell)
+    if warm is not None:
+        again = fitted_room(begin(warm, settings, tell, begun.coarse.closure), problem, settings, tell)
+        if left_over(again) < HEAT_WORTHWHILE * left_over(solved):
+            notes, solved = (), again
     tell(supplied(solved.layout, solved.best))
     return solution(solved, time.perf_counter() - start_s, use_images=settings.use_images, notes=notes)
 

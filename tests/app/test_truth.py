@@ -8,6 +8,7 @@ import pytest
 from app.errors import BadInputError
 from app.room_scene import known_boundary, room_box
 from app.truth import read_volume
+from core.room.openings import supply_turbulence
 
 ROOM = Path(str(files("app.sample") / "room.npz"))
 
@@ -85,3 +86,10 @@ def test_information_levels_tell_what_they_promise():
         "z_min": "adiabatic",
         "z_max": "adiabatic",
     }
+
+
+def test_a_supplys_length_scale_is_a_share_of_its_patchs_diameter():
+    supply = next(k for k in known_boundary(read_volume(ROOM), "operator") if k.kind == "inlet")
+
+    # What the case's own dictionaries hold for 0.6 x 0.2 m, 0.5 m/s, 10 % and 0.07.
+    assert supply_turbulence(supply) == pytest.approx((0.00375, 0.00179684), rel=1e-5)

@@ -152,7 +152,7 @@ def _empty(name: str, what: Made) -> RoomVolume:
         "outlet": what.outlet,
         "adiabatic_walls": list(what.adiabatic),
         "TI": 0.1,
-        "lscale": 0.05,
+        "lscale": 0.07,
         "heater": what.heater,
         "inlets": list(what.inlets),
     }

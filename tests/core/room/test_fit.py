@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from core.room.fit import gauss_newton
+from core.room.fit import gauss_newton, weighted_variance
 from core.room.steps import secant
 
 
@@ -54,3 +54,16 @@ def test_a_march_teaches_the_jacobian_its_own_move_and_nothing_else():
     np.testing.assert_allclose(learned @ moved, change)
     across = np.array([1.0, -1.0])
     np.testing.assert_allclose(learned @ across, jacobian @ across)
+
+
+def test_far_from_the_truth_images_are_believed_no_more_than_their_misfit():
+    # Ten shifts that are off by 3 and a thermometer by 2, of a room that two grids give within a tenth.
+    group = np.array([0] * 10 + [4])
+    residual = np.where(group == 0, 3.0, 2.0)
+    noise, grids = np.full(11, 1e-4), np.full(11, 0.1)
+
+    near = weighted_variance(noise, group, residual, grids)
+    far = weighted_variance(noise, group, residual, grids, far=True)
+
+    assert far[0] / near[0] == pytest.approx((9.0 + 1e-4) / (0.01 + 1e-4))
+    assert far[-1] == near[-1]

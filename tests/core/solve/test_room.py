@@ -11,10 +11,11 @@ from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.result import Solution
 from core.room.answer import Solved, solution
+from core.room.heaters import heaters_by_march
 from core.room.observe import observations
 from core.room.rivals import promising_closure
 from core.room.rounds import Begun, coarse_fit, fine_fit
-from core.room.runs import Derivatives
+from core.room.runs import Derivatives, attempt
 from core.room.search import fine_search
 from core.room.steps import misfit_ratio
 from core.scene import FixedTexture, FlowModel, Heater, Inlet, Outlet, Patch, Scene, View, Wall
@@ -208,6 +209,31 @@ def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothi
     if heated:
         assert asked_k[0] >= 30.0
         assert "at x = 1.2 to 1.6 m" in said[0]
+
+
+@pytest.mark.parametrize("deviations", [-2.0, 0.0, 1.0])
+def test_what_a_stated_heater_gives_off_is_found_by_marches(truth: Solution, deviations: float):
+    supply = replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))
+    panel = Heater(patch=Patch(wall="z_min", lower_m=(1.0, 0.6), upper_m=(1.6, 1.4)), temperature_k=333.15)
+    stated = replace(scene(supply), boundary=(*scene(supply).boundary, panel))
+    begun = begin(Problem(stated, ()), SETTINGS, lambda _: None)
+    own = begun.prior.names().index("heater_log_heat[0]")
+    vector = np.zeros(len(begun.prior.active()))
+    vector[own] = deviations
+    vertices = (SETTINGS.vertices,) * 3
+    there = attempt(
+        begun.coarse, begun.prior.parameters(vector), begun.base.flow.last, 60.0, vertices, lambda _: None
+    )
+    warmed = eqx.tree_at(lambda s: s.temperature_k, truth, there.seen.excess_k + 293.15)
+    data = observations(Problem(stated, measured(stated, warmed, 1e-5).shifts), vertices)
+    nothing = np.zeros(len(data.values()[0]))
+
+    found, room = heaters_by_march(
+        begun.coarse, begun.prior, data, begun.base, nothing, SETTINGS, lambda _: None
+    )
+
+    np.testing.assert_allclose(found, vector)
+    assert (misfit_ratio(data, room, begun.base) < 0.5) == (deviations != 0.0)
 
 
 def test_a_level_that_thermometers_moved_is_doubted_by_half_of_that(truth: Solution):

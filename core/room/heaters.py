@@ -1,0 +1,50 @@
+"""Heat coefficients of stated heaters, by marches: air above a warm one is a flow of its own, which no slope tells.
+
+What a surface of stated temperature gives off depends on its air: tables and programs differ by a factor of four. So
+the coarse room is marched with one heater after the other giving less, or more, until the images like it no better.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from core.room.observe import Observations
+from core.room.prior import Prior
+from core.room.room import Room
+from core.room.runs import Attempt, Event, RoomSettings, attempt
+from core.room.steps import Vector, misfit_ratio
+
+# How far a heater's coefficient is moved at most, in prior deviations of 0.6 in the logarithm.
+_FARTHEST = 2
+
+
+def heaters_by_march(
+    coarse: Room,
+    prior: Prior,
+    data: Observations,
+    base: Attempt,
+    offset: Float[np.ndarray, " data"],
+    settings: RoomSettings,
+    tell: Event,
+) -> tuple[Vector, Attempt]:
+    """Parameters in prior deviations, zero but for heaters' coefficients, and the coarse room under them."""
+    best = np.zeros(len(prior.active()))
+    for n, name in enumerate(prior.names()):
+        if not name.startswith("heater_log_heat"):
+            continue
+        start = best
+        for way in (-1.0, 1.0):
+            for deviations in range(1, _FARTHEST + 1):
+                vector = start.copy()
+                vector[n] = way * deviations
+                where = prior.parameters(vector)
+                tried = attempt(
+                    coarse, where, base.flow.last, settings.restart_s, data.vertices, lambda _: None
+                )
+                left = misfit_ratio(data, tried, base, offset)
+                tell({"heater": float(n), "deviations": float(vector[n]), "misfit_left": left})
+                if left >= 1.0:
+                    break
+                best, base = vector, tried
+            if np.any(best != start):
+                break
+    return best, base
