@@ -10,7 +10,7 @@ from core.problem import Problem
 from core.result import Solution
 from core.room.fit import Posterior
 from core.room.hold import departure, free_vertices, last_correction, layer_means, unheld
-from core.room.observe import Observations, Prediction
+from core.room.observe import IMAGES, Observations, Prediction
 from core.room.prior import Prior
 from core.room.runs import Attempt, Derivatives
 from core.room.sentences import balances, contradictions, misfit, undetermined
@@ -104,7 +104,7 @@ def held_k_m3_s(solved: Solved) -> float:
 def unexplained(data: Observations, seen: Prediction) -> float:
     """Share (rms) of the measured shifts that a room does not explain."""
     values, _, group = data.values()
-    shifts = group == 0
+    shifts = group == IMAGES
     if not shifts.any():
         return _UNSEEN_SHARE
     left = (values - data.predicted(seen))[shifts]

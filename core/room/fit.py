@@ -12,11 +12,11 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from core.room.observe import IMAGES, PLANES
+
 # Neighbours err together, and errors of grid and closure reach over whole jets: so many data count as one.
 _COHERENT = 12.0
 _STUDENT_NU = 3.0
-# Kinds of data, as `core.room.observe` numbers them, whose neighbours err together.
-IMAGES, PLANES = 0, 1
 LONGEST_STEP = 3.0
 
 

@@ -27,24 +27,24 @@ def heaters_by_march(
     tell: Event,
 ) -> tuple[Vector, Attempt]:
     """Parameters in prior deviations, zero but for heaters' coefficients, and the coarse room under them."""
-    best = np.zeros(len(prior.active()))
-    for n, name in enumerate(prior.names()):
-        if not name.startswith("heater_log_heat"):
-            continue
-        start = best
-        for way in (-1.0, 1.0):
-            for deviations in range(1, _FARTHEST + 1):
-                vector = start.copy()
-                vector[n] = way * deviations
-                where = prior.parameters(vector)
-                tried = attempt(
-                    coarse, where, base.flow.last, settings.restart_s, data.vertices, lambda _: None
-                )
-                left = misfit_ratio(data, tried, base, offset)
-                tell({"heater": float(n), "deviations": float(vector[n]), "misfit_left": left})
-                if left >= 1.0:
-                    break
-                best, base = vector, tried
-            if np.any(best != start):
+
+    def climbed(n: int, way: float, vector: Vector, base: Attempt) -> tuple[Vector, Attempt]:
+        for _ in range(_FARTHEST):
+            moved = vector.copy()
+            moved[n] += way
+            where, flow = prior.parameters(moved), base.flow.last
+            tried = attempt(coarse, where, flow, settings.restart_s, data.vertices, lambda _: None)
+            left = misfit_ratio(data, tried, base, offset)
+            tell({prior.names()[n]: float(moved[n]), "misfit_left": left})
+            if left >= 1.0:
                 break
-    return best, base
+            vector, base = moved, tried
+        return vector, base
+
+    vector = np.zeros(len(prior.active()))
+    for n, name in enumerate(prior.names()):
+        if name.startswith("heater_log_heat"):
+            vector, base = climbed(n, -1.0, vector, base)
+            if vector[n] == 0.0:
+                vector, base = climbed(n, 1.0, vector, base)
+    return vector, base

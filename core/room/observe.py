@@ -23,6 +23,8 @@ from core.scene import Outlet, Scene
 
 _BLOCKS_ACROSS = 28
 _WALL_MARGIN = 0.06
+# Groups of `Observations.values` whose neighbouring data err together.
+IMAGES, PLANES = 0, 1
 
 
 class ShiftBlocks(eqx.Module):

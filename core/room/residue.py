@@ -20,7 +20,7 @@ from scipy.linalg import block_diag
 
 from core.room.fit import spread
 from core.room.grid import AXES, WALLS
-from core.room.observe import Observations, ShiftBlocks
+from core.room.observe import IMAGES, PLANES, Observations, ShiftBlocks
 from core.room.vertices import linear_matrix
 
 # Neighbouring data err together: so many count as one.
@@ -67,15 +67,15 @@ def temperature_correction(
     known = np.asarray(block_diag(np.linalg.inv(prior), layer))
     gained = np.zeros(len(known))
     for g, design in (
-        (0, _shift_design(data, excess_k, basis)),
-        (1, _plane_design(data, excess_k, basis)),
+        (IMAGES, _shift_design(data, excess_k, basis)),
+        (PLANES, _plane_design(data, excess_k, basis)),
         (2, _sensor_design(data)),
         (4, _outlet_design(data)),
     ):
         own = group == g
         if own.any():
             # A thermometer stands in one place, which no smooth correction describes.
-            pooled = g <= 1
+            pooled = g in (IMAGES, PLANES)
             error = _UNEXPLAINED * spread(residual[own]) if pooled else _POINT_SHARE * departure_k
             weight = 1.0 / (variance[own] + error**2) / (_CORRELATED if pooled else 1.0)
             extra = _layer_design(data, unknown_walls) if g == 1 else np.zeros((len(design), layers))
