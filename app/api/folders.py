@@ -31,8 +31,9 @@ class Folders:
         self._known: dict[str, tuple[int, Experiment]] = {}
 
     def all(self) -> list[Path]:
-        """Return the experiments' folders, newest first."""
-        return sorted((p.parent for p in self.root.glob(f"*/{SETTINGS}")), key=lambda p: p.name, reverse=True)
+        """Return the experiments' folders, newest first; one that is still being made is hidden."""
+        found = (path.parent for path in self.root.glob(f"[!.]*/{SETTINGS}"))
+        return sorted(found, key=lambda folder: folder.name, reverse=True)
 
     def folder(self, experiment: str) -> Path:
         """Return an experiment's folder. Raises ApiError when there is none."""

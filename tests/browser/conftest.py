@@ -118,9 +118,11 @@ def opens(chromium: Browser) -> Iterator[Opens]:
         context.set_default_timeout(PATIENCE_MS)
         page = context.new_page()
         complaints: list[str] = []
-        page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
+        page.on(
+            "console",
+            lambda m: complaints.append(f"{m.text} {m.location['url']}") if m.type == "error" else None,
+        )
         page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("response", lambda r: complaints.append(f"{r.url}: {r.text()}") if r.status == 422 else None)
         page.goto(address)
         return Watched(page, complaints)
 

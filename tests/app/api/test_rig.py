@@ -34,6 +34,13 @@ def finish(airlens: Client, limit_s: float = 200.0) -> str:
     return airlens.running_capture().state
 
 
+def test_an_experiment_that_is_still_being_made_is_not_listed(airlens: Client, experiment: str, live: Live):
+    unfinished = live.config.data_root / "experiments" / ".20260101T000000-simulated.unfinished"
+    unfinished.mkdir()
+    (unfinished / "experiment.toml").write_text("half of it")
+    assert [one.experiment for one in airlens.experiments()] == [experiment]
+
+
 def test_a_new_experiment_is_listed_connected_and_not_calibrated(airlens: Client, experiment: str):
     line = next(one for one in airlens.experiments() if one.experiment == experiment)
     assert (line.title, line.camera, line.calibrated, line.captures) == (
