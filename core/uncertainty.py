@@ -5,8 +5,9 @@
 D holds the fields' derivatives in the fitted parameters and C their posterior covariance. The second term
 is what a grid and a closure cannot represent, smoothed: two grids differ by about what the finer one still
 lacks, two closures by about what either does, and both matter by the share m of the images that the room
-leaves unexplained. s is the field's own scale. a, b and c were set on two reference rooms, so that 95 % intervals
-hold there, and looked at on rooms of other closures.
+leaves unexplained. s is the field's own scale. a, b and c were set so that 95 % intervals hold: those of u and p on
+two reference rooms, and looked at on rooms of other closures; those of T on six rooms, four of other closures or
+with a plume.
 """
 
 import equinox as eqx

@@ -20,11 +20,11 @@ from core.uncertainty import Deviation, Represented, deviation
 # Taken for the share of the images that is left unexplained where there are none.
 _UNSEEN_SHARE = 0.3
 # What grid, closure and scale leave open (a, c and b of `core.uncertainty`).
-_SHARES = {"excess_k": (0.2, 1.0, 0.2), "pressure_m2_s2": (0.3, 2.0, 5.0), "velocity_m_s": (0.2, 5.0, 0.3)}
+_SHARES = {"excess_k": (0.1, 0.3, 1.0), "pressure_m2_s2": (0.3, 2.0, 5.0), "velocity_m_s": (0.2, 5.0, 0.3)}
 # A level that thermometers moved is doubted by half of that: they stand in a few places, of which the room was wrong.
 _DOUBT = 0.5
 # Of c, where one guessed viscosity stands for all air: images that a map of it explains do not make it the right one.
-_GUESSED_VISCOSITY = {"excess_k": 8.0, "pressure_m2_s2": 1.0, "velocity_m_s": 2.0}
+_GUESSED_VISCOSITY = {"excess_k": 20.0, "pressure_m2_s2": 1.0, "velocity_m_s": 2.0}
 
 
 class Solved(eqx.Module):
@@ -54,17 +54,18 @@ def solution(solved: Solved, seconds: float, *, use_images: bool, notes: tuple[s
     free = free_vertices(solved.layout, best.seen.excess_k.shape)
     start = unheld(best.seen, solved.before.seen, solved.data, solved.prior, free)
     change = last_correction(solved.data, solved.prior, solved.derivatives, start)
+    x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(start.excess_k.shape))
     excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     moved_k = float(layer_means(excess - solved.before.seen.excess_k).mean())
     before, after = (
         (v[:, None, :] + (_DOUBT * moved_k) ** 2) * free
         for v in (change.prior_variance_k2, change.variance_k2)
     )
+    bent = bent_m4_s4(problem, z, before), bent_m4_s4(problem, z, after)
     share = unexplained(solved.data, best.seen)
     temperature = _deviation(solved, "excess_k", local_k, share, (before, after))
-    pressure = _deviation(solved, "pressure_m2_s2", departure(best.seen.pressure_m2_s2), share)
+    pressure = _deviation(solved, "pressure_m2_s2", departure(best.seen.pressure_m2_s2), share, bent)
     velocity = _deviation(solved, "velocity_m_s", rms(best.seen.velocity_m_s), share)
-    x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(excess.shape))
     return Solution(
         x,
         y,
@@ -117,6 +118,14 @@ def carried_m2_s2(
     """Pressure over height that carries air which is warmer by this: dp/dz = g beta dT, its mean at each height."""
     buoyancy = GRAVITY_M_S2 * problem.scene.air.expansion_per_k * warmer_k.mean((0, 1))
     return cumulative_trapezoid(buoyancy, z_m, initial=0.0)
+
+
+def bent_m4_s4(
+    problem: Problem, z_m: Float[np.ndarray, " vz"], variance_k2: Float[np.ndarray, "vx vy vz"]
+) -> Float[np.ndarray, " vz"]:
+    """Variance of p about its mean where the air at all heights is too warm together, with this variance."""
+    carried = carried_m2_s2(problem, z_m, np.sqrt(variance_k2))
+    return np.square(carried - carried.mean())
 
 
 def rms(field: Float[np.ndarray, "..."]) -> float:

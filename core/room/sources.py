@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import equinox as eqx
 import numpy as np
@@ -40,26 +41,44 @@ def with_suspected_heat(
 ) -> Problem | None:
     """The problem with the strip of floor whose heat the images like best, and its neighbours; None for no strip."""
     strips = floor_strips(begun.problem)
+    climbs = climbed_each(strips, begun, data, settings)
+    if min((climb.left for climb in climbs), default=1.0) > _WORTHWHILE:
+        return None
+    best = min(climbs, key=lambda climb: climb.left)
+    # A panel may lie half on one strip and half on the next.
+    between = floor_strips(begun.problem, between=True)
+    halves = [strip for strip in between if share_area(strip.patch, best.strip.patch)]
+    best = min((best, *climbed_each(halves, begun, data, settings)), key=lambda climb: climb.left)
+    tell({"suspected_k": best.heat_k, "misfit_left": best.left})
+    warm = replace(best.strip, temperature_k=best.strip.temperature_k + best.heat_k)
+    beside = [strip for strip in (*strips, *between) if adjoin(strip, warm)]
+    return with_heaters(
+        begun.problem, [replace(s, temperature_std_k=_STD_SHARE * best.heat_k) for s in (warm, *beside)]
+    )
+
+
+class Climb(NamedTuple):
+    """By how many kelvin a strip was warm where it left least of the misfit of the room without, and how much."""
+
+    left: float
+    heat_k: float
+    strip: SuspectedHeater
+
+
+def climbed_each(
+    strips: Sequence[SuspectedHeater], begun: Begun, data: Observations, settings: RoomSettings
+) -> list[Climb]:
+    """Every strip by itself."""
     cold = with_heaters(begun.problem, strips)
     coarse = room(cold.scene, settings.coarse_cells, begun.coarse.closure)
     mean = room_prior(cold, coarse.layout).mean
     before = len(mean.heater_excess_k) - len(strips)
 
-    def climb(strip: int) -> tuple[float, float]:
-        return climbed(before + strip, coarse, mean, begun, data, settings)
+    def climb(n: int) -> Climb:
+        return Climb(*climbed(before + n, coarse, mean, begun, data, settings), strips[n])
 
     with ThreadPoolExecutor(settings.threads) as pool:
-        climbs = list(pool.map(climb, range(len(strips))))
-    if min((left for left, _ in climbs), default=1.0) > _WORTHWHILE:
-        return None
-    best = int(np.argmin([left for left, _ in climbs]))
-    left, heat_k = climbs[best]
-    tell({"suspected_k": heat_k, "misfit_left": left})
-    warm = replace(strips[best], temperature_k=strips[best].temperature_k + heat_k)
-    beside = [s for s in strips if adjoin(s, warm)]
-    return with_heaters(
-        begun.problem, [replace(s, temperature_std_k=_STD_SHARE * heat_k) for s in (warm, *beside)]
-    )
+        return list(pool.map(climb, range(len(strips))))
 
 
 def climbed(
@@ -77,10 +96,11 @@ def climbed(
     return least, best_k
 
 
-def floor_strips(problem: Problem) -> list[SuspectedHeater]:
-    """Strips of floor as warm as the air, wherever no other patch lies."""
+def floor_strips(problem: Problem, *, between: bool = False) -> list[SuspectedHeater]:
+    """Strips of floor as warm as the air, wherever no other patch lies; or those half-way `between` these."""
     box, scene = problem.scene.room, problem.scene
     edges_m = np.linspace(box.lower_m[0], box.upper_m[0], _STRIPS + 1)
+    edges_m = 0.5 * (edges_m[:-1] + edges_m[1:]) if between else edges_m
     middle_m, half_m = box.centre_m[1], 0.5 * _DEPTH_SHARE * box.size_m[1]
     air_k = scene.air.ambient_temperature_k + (outflow_excess_k(problem) or 0.0)
     taken = [b.patch for b in scene.boundary if isinstance(b, Inlet | Outlet | Heater)]

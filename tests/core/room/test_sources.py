@@ -34,6 +34,16 @@ def test_strips_cover_the_floor_from_end_to_end_half_way_into_the_room():
     assert [adjoin(found[2], other) for other in found] == [False, True, False, True, False]
 
 
+def test_strips_half_way_between_adjoin_one_another_only():
+    given = problem(stated=False)
+    found, between = floor_strips(given), floor_strips(given, between=True)
+
+    edges = [(s.patch.lower_m[0], s.patch.upper_m[0]) for s in between]
+    np.testing.assert_allclose(edges, [(0.4 * n + 0.2, 0.4 * n + 0.6) for n in range(4)])
+    assert [adjoin(between[1], other) for other in between] == [True, False, True, False]
+    assert not any(adjoin(between[1], other) for other in found)
+
+
 def test_a_strip_is_left_out_where_another_patch_lies():
     given = problem(stated=False)
     stated = Heater(patch=Patch(wall="z_min", lower_m=(0.5, 0.9), upper_m=(0.7, 1.1)), temperature_k=310.0)
