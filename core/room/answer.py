@@ -122,10 +122,10 @@ def carried_m2_s2(
 
 def bent_m4_s4(
     problem: Problem, z_m: Float[np.ndarray, " vz"], variance_k2: Float[np.ndarray, "vx vy vz"]
-) -> Float[np.ndarray, " vz"]:
+) -> Float[np.ndarray, "vx vy vz"]:
     """Variance of p about its mean where the air at all heights is too warm together, with this variance."""
     carried = carried_m2_s2(problem, z_m, np.sqrt(variance_k2))
-    return np.square(carried - carried.mean())
+    return np.broadcast_to(np.square(carried - carried.mean()), variance_k2.shape)
 
 
 def rms(field: Float[np.ndarray, "..."]) -> float:

@@ -1,10 +1,11 @@
 """Heat that nobody stated: a warm strip of the floor, where the images ask for one.
 
 Where walls are unknown, so is whether a heater stands on one. A room that no wall's temperature and no supply brings
-near the images is marched with a panel on one strip of floor after the other, below the middle of the view,
-each warmer until the images like it no better: where the air rises they show, how deep in the room they do not. Air
-above a heater is another flow than without, so marches are compared and no derivatives. The best strip is given to
-the fit as a heater whose heat is half known, between two neighbours that may share it.
+near the images is marched with a panel on one strip of floor after the other, below the middle of the view, then
+half-way to the neighbours of the best, each warmer until the images like it no better: where the air rises they
+show, how deep in the room they do not. Air above a heater is another flow than without, so marches are compared and
+no derivatives. The best strip is given to the fit as a heater whose heat is half known, between two neighbours that
+may share it.
 """
 
 from collections.abc import Sequence

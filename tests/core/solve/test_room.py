@@ -189,14 +189,16 @@ def test_another_closure_is_tried_where_it_leaves_less_of_the_images(
     assert promising_closure(where(0.5, 0.0), begun.coarse) == wanted
 
 
-@pytest.mark.parametrize("heated", [True, False])
+@pytest.mark.parametrize("low_m", [1.2, 1.0, None])
 def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothing_else_explains(
-    heated: bool,
+    low_m: float | None,
 ):
-    patch = Patch(wall="z_min", lower_m=(1.2, 0.8), upper_m=(1.6, 1.2))
     openings = scene(replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))).boundary[:2]
-    heater = (Heater(patch=patch, temperature_k=343.15),) if heated else ()
-    there = replace(scene(SUPPLY), boundary=(*openings, *heater))
+    heaters = [
+        Heater(patch=Patch(wall="z_min", lower_m=(x, 0.8), upper_m=(x + 0.4, 1.2)), temperature_k=343.15)
+        for x in ([] if low_m is None else [low_m])
+    ]
+    there = replace(scene(SUPPLY), boundary=(*openings, *heaters))
     entered = replace(there, boundary=openings)
     problem = measured(entered, solve_room(Problem(there, ()), SETTINGS), 1e-5)
     problem = Problem(problem.scene, problem.shifts)
@@ -205,10 +207,10 @@ def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothi
 
     asked_k = [event["suspected_k"] for event in told if "suspected_k" in event]
     said = [note for note in found.notes if "heat that is not in the scene" in note]
-    assert len(asked_k) == len(said) == (1 if heated else 0)
-    if heated:
+    assert len(asked_k) == len(said) == len(heaters)
+    if low_m is not None:
         assert asked_k[0] >= 30.0
-        assert "at x = 1.2 to 1.6 m" in said[0]
+        assert f"at x = {low_m:.1f} to {low_m + 0.4:.1f} m" in said[0]
 
 
 @pytest.mark.parametrize("deviations", [-2.0, 0.0, 1.0])
