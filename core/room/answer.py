@@ -20,7 +20,7 @@ from core.uncertainty import Deviation, Represented, deviation
 # Taken for the share of the images that is left unexplained where there are none.
 _UNSEEN_SHARE = 0.3
 # What grid, closure and scale leave open (a, c and b of `core.uncertainty`).
-_SHARES = {"excess_k": (0.1, 0.3, 1.0), "pressure_m2_s2": (0.3, 2.0, 5.0), "velocity_m_s": (0.2, 5.0, 0.3)}
+_SHARES = {"excess_k": (0.1, 0.3, 1.0), "pressure_m2_s2": (0.3, 1.0, 1.0), "velocity_m_s": (0.2, 5.0, 0.3)}
 # A level that thermometers moved is doubted by half of that: they stand in a few places, of which the room was wrong.
 _DOUBT = 0.5
 # Of c, where one guessed viscosity stands for all air: images that a map of it explains do not make it the right one.
