@@ -78,7 +78,7 @@ def temperature_correction(
             pooled = g in (IMAGES, PLANES)
             error = _UNEXPLAINED * spread(residual[own]) if pooled else _POINT_SHARE * departure_k
             weight = 1.0 / (variance[own] + error**2) / (_CORRELATED if pooled else 1.0)
-            extra = _layer_design(data, unknown_walls) if g == 1 else np.zeros((len(design), layers))
+            extra = _layer_design(data, unknown_walls) if g == PLANES else np.zeros((len(design), layers))
             whole = np.concatenate([design, extra], axis=1)
             known = known + (whole.T * weight) @ whole
             gained = gained + (whole.T * weight) @ residual[own]

@@ -194,10 +194,10 @@ def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothi
     low_m: float | None,
 ):
     openings = scene(replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))).boundary[:2]
-    heaters = [
-        Heater(patch=Patch(wall="z_min", lower_m=(x, 0.8), upper_m=(x + 0.4, 1.2)), temperature_k=343.15)
-        for x in ([] if low_m is None else [low_m])
-    ]
+    heaters: tuple[Heater, ...] = ()
+    if low_m is not None:
+        patch = Patch(wall="z_min", lower_m=(low_m, 0.8), upper_m=(low_m + 0.4, 1.2))
+        heaters = (Heater(patch=patch, temperature_k=343.15),)
     there = replace(scene(SUPPLY), boundary=(*openings, *heaters))
     entered = replace(there, boundary=openings)
     problem = measured(entered, solve_room(Problem(there, ()), SETTINGS), 1e-5)
