@@ -10,8 +10,8 @@ import sys
 import typer
 
 import app.commands
-from app.compilation_cache import use_compilation_cache
 from app.errors import AirlensError, BadInputError
+from app.files.compilation_cache import use_compilation_cache
 from core.setting import SettingError
 from drivers.errors import DeviceError
 

@@ -15,24 +15,24 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import TypeAdapter
 
-from app.api.about import About, Health
-from app.api.calibrations import CalibrationResource
-from app.api.captures import CaptureResource, DeskResource, Role
-from app.api.devices import CameraResource
-from app.api.events import EventResource
-from app.api.experiments import ExperimentLine, ExperimentResource
-from app.api.guide import GuideResource, StepText
-from app.api.jobs import Curves, JobResource
-from app.api.problems import MEDIA_TYPE, Problem
-from app.api.projector import ProjectorResource, WireLine
-from app.api.results import ComparisonResource, PresetResource, ResultLine, ResultResource
-from app.api.screen import ScreenResource
-from app.api.shift import ShiftResource
-from app.api.uploads import Upload
-from app.durable import write_durably
+from app.api.resources.about import About, Health
+from app.api.resources.calibrations import CalibrationResource
+from app.api.resources.captures import CaptureResource, DeskResource, Role
+from app.api.resources.devices import CameraResource
+from app.api.resources.events import EventResource
+from app.api.resources.experiments import ExperimentLine, ExperimentResource
+from app.api.resources.guide import GuideResource, StepText
+from app.api.resources.jobs import Curves, JobResource
+from app.api.resources.projector import ProjectorResource, WireLine
+from app.api.resources.results import ComparisonResource, PresetResource, ResultLine, ResultResource
+from app.api.resources.screen import ScreenResource
+from app.api.resources.shift import ShiftResource
+from app.api.resources.uploads import Upload
+from app.api.wire.problems import MEDIA_TYPE, Problem
 from app.errors import AirlensError, BadInputError
-from app.patterns import PatternName
-from app.plan_record import Plan
+from app.experiment.plan import Plan
+from app.files.durable import write_durably
+from app.rig.patterns import PatternName
 
 T = TypeVar("T")
 ENDED = ("done", "failed", "cancelled")

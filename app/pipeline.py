@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from app.check import rendered_agreement
-from app.configuration import to_plain
-from app.durable import write_text
-from app.experiment import Experiment, new_id, open_experiment, write_manifest
-from app.judge import aged
-from app.measure import Measurement, measure, with_calibration
-from app.plan import settled
-from app.presets import preset as preset_called
-from app.presets import resolved, solve_with
-from app.provenance import provenance
-from app.report import write_report
-from app.results import write_result
-from app.shift_files import write_shifts
+from app.capture.checks import aged
+from app.experiment.folder import Experiment, new_id, open_experiment, write_manifest
+from app.experiment.results import write_result
+from app.experiment.shift_files import write_shifts
+from app.files.durable import write_text
+from app.files.provenance import provenance
+from app.files.toml import to_plain
+from app.plan.make import settled
+from app.reconstruct.agreement import rendered_agreement
+from app.reconstruct.measure import Measurement, measure, with_calibration
+from app.reconstruct.presets import preset as preset_called
+from app.reconstruct.presets import resolved, solve_with
+from app.report.page import write_report
 from core.result import Solution
 from core.solve.check import check_problem
 from core.solve.checkpoint import CheckpointStore

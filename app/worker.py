@@ -18,9 +18,9 @@ from pathlib import Path
 
 import psutil
 
-from app.compilation_cache import use_compilation_cache
-from app.durable import make_folder, write_json
 from app.errors import AirlensError
+from app.files.compilation_cache import use_compilation_cache
+from app.files.durable import make_folder, write_json
 from app.jobs import kinds
 from app.jobs.errors import FencedError
 from app.jobs.folder import JobFolder, Owner, beat, try_lock

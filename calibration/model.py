@@ -17,9 +17,9 @@ from calibration.bundle import CalibratedOptics, CalibratedWall, Quality
 from calibration.errors import CalibrationError
 from calibration.flat_wall import FlatWall, adjust_on_wall
 from calibration.intrinsics import Intrinsics, fit_intrinsics
-from calibration.level import level_of
 from calibration.pair import Pair, fit_pair
 from calibration.record import Record, SeenBoard, array_of
+from calibration.vertical import level_of
 from calibration.wall import Correspondences, Plane
 from calibration.world import Anchor, World, difference, levelled, optics_in, world_of
 

@@ -20,7 +20,7 @@ from jaxtyping import Float
 
 from calibration.bundle import OPTICS_PARAMETERS, Bundle
 from calibration.errors import BundleError
-from calibration.rehearsal import rays_of
+from calibration.simulated_pictures import rays_of
 from calibration.world import shifted
 from core.geometry import Optics
 

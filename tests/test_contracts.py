@@ -23,7 +23,7 @@ def run_contracts(folder):
         ("core/air.py", "import drivers.protocols", "core and drivers never meet"),
         ("drivers/protocols.py", "import jax", "drivers know no science"),
         ("calibration/bundle.py", "import drivers.protocols", "calibration takes images"),
-        ("app/score.py", "import drivers.simulated", "only app.rig"),
+        ("app/volume/score.py", "import drivers.simulated", "only app.rig.open"),
         ("core/air.py", None, None),
     ],
 )

@@ -6,7 +6,8 @@ from collections.abc import AsyncIterator
 from fastapi import APIRouter, FastAPI
 from starlette.middleware import Middleware
 
-from app.api import (
+from app.api.page import add_page
+from app.api.resources import (
     about,
     calibrations,
     captures,
@@ -19,18 +20,17 @@ from app.api import (
     projector,
     results,
     screen,
-    session,
     shift,
     uploads,
 )
-from app.api.audit import AuditLog
-from app.api.description import describe
-from app.api.guard import Guard
-from app.api.handlers import add_handlers
-from app.api.page import add_page
+from app.api.security import session
+from app.api.security.audit import AuditLog
+from app.api.security.guard import Guard
+from app.api.security.settings import ServiceConfig
 from app.api.services import create_services
-from app.api.settings import ServiceConfig
-from app.kiosk import create_kiosk_router
+from app.api.wire.description import describe
+from app.api.wire.handlers import add_handlers
+from app.kiosk.routes import create_kiosk_router
 
 RESOURCES: tuple[APIRouter, ...] = (
     about.router,

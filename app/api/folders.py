@@ -4,8 +4,8 @@ import os
 import shutil
 from pathlib import Path
 
-from app.api.problems import ApiError
-from app.experiment import Experiment, finished, interrupted, open_experiment
+from app.api.wire.problems import ApiError
+from app.experiment.folder import Experiment, finished, interrupted, open_experiment
 
 SETTINGS = "experiment.toml"
 

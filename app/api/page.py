@@ -6,7 +6,7 @@ from fastapi import FastAPI
 from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, Response
 
-from app.api.problems import ApiError
+from app.api.wire.problems import ApiError
 
 MEDIA_TYPES = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".woff2": "font/woff2"}
 NOT_BUILT = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>airlens</title></head>

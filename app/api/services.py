@@ -6,20 +6,20 @@ from typing import Annotated
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
-from app.api.access import Access
-from app.api.curves import CurveCache
-from app.api.feed import EventFeed
 from app.api.folders import Folders
-from app.api.settings import ServiceConfig
-from app.api.volumes import SolutionCache
-from app.calibration_desk import CalibrationDesk
-from app.desk import CaptureDesk
+from app.api.security.access import Access
+from app.api.security.settings import ServiceConfig
+from app.api.wire.curves import CurveCache
+from app.api.wire.feed import EventFeed
+from app.api.wire.volumes import SolutionCache
+from app.calibrate.service import CalibrationDesk
+from app.capture.service import CaptureDesk
+from app.files.uploads.store import UploadLimits, UploadStore
 from app.jobs import Ledger
 from app.jobs.state import ACTIVE
-from app.kiosk_screen import KioskScreen
-from app.live import LiveCamera
-from app.live_projector import LiveProjector
-from app.uploads.store import UploadLimits, UploadStore
+from app.kiosk.screen import KioskScreen
+from app.rig.live_camera import LiveCamera
+from app.rig.live_projector import LiveProjector
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,16 @@ import pkgutil
 
 import typer
 
-import app.benches
+import app.bench
 
 
 def register(cli: typer.Typer) -> None:
-    """Add `bench` and every benchmark in `app.benches`."""
+    """Add `bench` and every benchmark in `app.bench`."""
     bench = typer.Typer(no_args_is_help=True, help="Measure speed and the error that it bought.")
 
     @bench.callback()
     def _bench() -> None: ...
 
-    for module in sorted(m.name for m in pkgutil.iter_modules(app.benches.__path__)):
-        importlib.import_module(f"app.benches.{module}").register(bench)
+    for module in sorted(m.name for m in pkgutil.iter_modules(app.bench.__path__)):
+        importlib.import_module(f"app.bench.{module}").register(bench)
     cli.add_typer(bench, name="bench")

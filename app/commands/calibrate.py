@@ -9,9 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
-from app.calibrate import Pictures, Step, built, calibrate_camera, calibrate_projector, calibrate_wall
-from app.calibrate_live import LiveOptions, run_live
-from app.calibrate_options import (
+from app.calibrate.folder import CalibrationFolder
+from app.calibrate.guide import LivePlan, StepName
+from app.calibrate.options import (
     Ambient,
     AsJson,
     Bits,
@@ -40,13 +40,13 @@ from app.calibrate_options import (
     panel_size,
     told,
 )
-from app.calibrate_response import calibrate_response, drift_between
-from app.calibration_folder import CalibrationFolder
-from app.calibration_guide import LivePlan, StepName
-from app.calibration_page import write_page
-from app.calibration_summary import lines, summary
-from app.conditions import Conditions, conditions_of, note_conditions
+from app.calibrate.page import write_page
+from app.calibrate.response import calibrate_response, drift_between
+from app.calibrate.steps import Pictures, Step, built, calibrate_camera, calibrate_projector, calibrate_wall
+from app.calibrate.summary import lines, summary
+from app.calibrate.terminal import LiveOptions, run_live
 from app.errors import AirlensError, BadInputError
+from app.rig.conditions import Conditions, conditions_of, note_conditions
 from calibration.bundle import Bundle
 from calibration.errors import CalibrationError
 from calibration.strict import encode

@@ -47,8 +47,8 @@ def _command(kind: CaptureKind):
         on_abort: Annotated[str, typer.Option(help="After Ctrl-C: keep or discard.")] = "keep",
         as_json: AsJson = False,
     ) -> None:
-        from app.conditions import Conditions
         from app.errors import BadInputError
+        from app.rig.conditions import Conditions
         from drivers.burst import CapturePlan
 
         if on_abort not in ("keep", "discard"):
@@ -69,9 +69,9 @@ def _command(kind: CaptureKind):
 
 
 def _take(folder: Path, plan, bursts: int, every_s: float, on_abort, told, as_json: bool) -> None:
-    from app.experiment import open_experiment
-    from app.rig import open_camera
-    from app.taking import interruptible, take, take_sequence
+    from app.capture.burst import interruptible, take, take_sequence
+    from app.experiment.folder import open_experiment
+    from app.rig.open import open_camera
     from drivers.sequence import evenly
 
     experiment = open_experiment(folder)
@@ -136,10 +136,10 @@ def watch(
 
     import numpy as np
 
-    from app.capture import load_capture
-    from app.experiment import open_experiment
-    from app.rig import open_camera
-    from app.taking import interruptible
+    from app.capture.burst import interruptible
+    from app.experiment.captures import load_capture
+    from app.experiment.folder import open_experiment
+    from app.rig.open import open_camera
     from drivers.quick_look import quick_look
 
     opened = open_experiment(experiment)

@@ -23,11 +23,14 @@ def demo(
     frames: Annotated[int, typer.Option(min=1, help="Frames averaged in each capture.")] = 100,
 ) -> None:
     """The whole chain on a packaged room: simulate a rig, capture, reconstruct, report."""
-    from app.demo import run_demo
+    from app.simulate.demo import run_demo
 
     console = Console()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=console) as progress, as_file(files("app.sample") / "room.npz") as room:
+    with (
+        Progress(*columns, console=console) as progress,
+        as_file(files("app.simulate.sample") / "room.npz") as room,
+    ):
         task = progress.add_task("start", total=None)
         story = run_demo(
             folder, room, camera_px, frames, lambda name: progress.update(task, description=name)

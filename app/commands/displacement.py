@@ -26,10 +26,10 @@ def displacement(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Estimate the shift field between two pictures (TIFF or PNG), with its uncertainty."""
-    from app.displacement import shift_field, write_shift_field
-    from app.durable import write_durably
-    from app.figures import as_png, shift_field_figure
-    from app.pictures import read_picture
+    from app.files.durable import write_durably
+    from app.files.pictures import read_picture
+    from app.report.displacement import shift_field, write_shift_field
+    from app.report.figures import as_png, shift_field_figure
 
     field = shift_field(read_picture(reference), read_picture(flow), window_px, remove_drift)
     write_shift_field(output, field, f"{reference.name} to {flow.name}")

@@ -28,8 +28,8 @@ def kiosk(
     """
     import time
 
-    from app.screens import open_screen
-    from app.taking import interruptible
+    from app.capture.burst import interruptible
+    from app.rig.screens import open_screen
 
     shown = _picture(picture, identify)
     rows, cols = shown.shape

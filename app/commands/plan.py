@@ -10,7 +10,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from app.plan import Plan
+    from app.plan.make import Plan
 
 
 def register(cli: typer.Typer) -> None:
@@ -26,8 +26,8 @@ def plan(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Say what this rig would see of this room, at what price, and what would help: before measuring."""
-    from app.configuration import to_plain
-    from app.plan import plan as run
+    from app.files.toml import to_plain
+    from app.plan.make import plan as run
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, transient=True, disable=as_json) as progress:

@@ -19,9 +19,9 @@ def preview(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Take one frame; print its level, contrast, focus and saturation with advice."""
-    from app.experiment import open_experiment
-    from app.quality_line import judge_frame, write_picture
-    from app.rig import open_camera
+    from app.experiment.folder import open_experiment
+    from app.rig.frame_report import judge_frame, write_picture
+    from app.rig.open import open_camera
 
     with open_camera(open_experiment(experiment), "still") as camera:
         if exposure is not None:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from app.projectors import PASSWORD, open_real_projector
+from app.rig.projectors import PASSWORD, open_real_projector
 
 Url = Annotated[
     str,
@@ -75,8 +75,8 @@ def check(
     as_json: AsJson = False,
 ) -> None:
     """Show the scene's pattern and let the camera say whether it sees what was sent."""
-    from app.experiment import open_experiment
-    from app.pattern_check import check_projector
+    from app.capture.pattern_check import check_projector
+    from app.experiment.folder import open_experiment
 
     verdict = check_projector(
         open_experiment(experiment), screen, port, lambda text: typer.echo(text, err=True)

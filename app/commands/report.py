@@ -19,7 +19,7 @@ def report(
     result: Result = None,
 ) -> None:
     """Write the report of a result: one HTML file that needs no network."""
-    from app.report import write_report
+    from app.report.page import write_report
 
     typer.echo(str(write_report(experiment, result)))
 
@@ -34,6 +34,6 @@ def export(
     result: Result = None,
 ) -> None:
     """Write a result as NetCDF, VTK image data (ParaView), or CSV."""
-    from app.export import export as run
+    from app.report.export import export as run
 
     typer.echo(str(run(experiment, kind, output, result)))

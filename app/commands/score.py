@@ -21,7 +21,7 @@ def score(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Compare the newest result with a known room, beside the trivial answers."""
-    from app.score import score_experiment
+    from app.volume.score import score_experiment
 
     scores = score_experiment(experiment, truth, result)
     if as_json:

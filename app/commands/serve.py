@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from app.api import create_app
+from app.api.security.settings import LOOPBACK, service_config
+from app.api.security.token import service_token
 from app.api.server import Tls, listen, server_of
-from app.api.settings import LOOPBACK, service_config
-from app.api.token import service_token
 from app.errors import BadInputError
 from app.jobs import attended
 

@@ -44,9 +44,9 @@ def simulate(
     seed: Annotated[int, typer.Option(help="Seed of pattern, noise and drift.")] = 0,
 ) -> None:
     """Make a complete experiment from a room volume: scene, calibration, reference and flow captures."""
-    from app.rig_settings import SimulatedCameraSettings
-    from app.room_scene import RIG_PLACES, RigOptions
-    from app.simulate import simulate as run
+    from app.experiment.rig_settings import SimulatedCameraSettings
+    from app.simulate.experiment import simulate as run
+    from app.volume.scene import RIG_PLACES, RigOptions
 
     rig_stand_off_m, rig_baseline_m = RIG_PLACES[rig]
     options = RigOptions(

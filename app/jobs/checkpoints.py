@@ -4,7 +4,7 @@ import itertools
 import time
 from pathlib import Path
 
-from app.durable import write_durably
+from app.files.durable import write_durably
 
 KEPT = 2
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from app.configuration import Strict, read_toml
+from app.files.toml import Strict, read_toml
 
 GIB = 1 << 30
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from app.durable import make_folder, write_json
+from app.files.durable import make_folder, write_json
 from app.jobs import kinds
 from app.jobs.errors import FencedError
 

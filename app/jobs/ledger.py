@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from app.durable import make_folder, write_json
+from app.files.durable import make_folder, write_json
 from app.jobs import kinds
 from app.jobs.errors import JobError, UnknownJobError
 from app.jobs.records import Event, Group, Job, JobSpec, event_of, job_of

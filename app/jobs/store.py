@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from app.durable import make_folder, sync
+from app.files.durable import make_folder, sync
 from app.jobs.errors import LedgerError
 from app.jobs.state import ACTIVE, JobState
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.durable import write_json
 from app.errors import BadInputError
+from app.files.durable import write_json
 from app.jobs import kinds
 from app.jobs.folder import JobFolder
 from app.jobs.ledger import Ledger

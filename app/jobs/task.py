@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32
 
-from app.durable import make_folder, publish_folder, write_json
 from app.errors import BadInputError
+from app.files.durable import make_folder, publish_folder, write_json
 from app.jobs.folder import JobFolder, Owner
 
 PLANE_FILE = "plane.npy"

@@ -9,11 +9,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.boussinesq import Flow, Numbers, Residuals
 from core.grid.interpolation import on_axes_together
 from core.grid.residuals import as_residuals, discrete_residuals
 from core.grid.staggered import Staggered, StaggeredGrid
-from core.representation import Spans, positions
+from core.losses.boussinesq import Flow, Numbers, Residuals
+from core.losses.representation import Spans, positions
 
 
 class MultiGrid(eqx.Module):
@@ -47,7 +47,7 @@ class MultiGrid(eqx.Module):
 
 
 class GridFields(eqx.Module):
-    """T, p, u of a staggered state: see `core.representation.Fields`."""
+    """T, p, u of a staggered state: see `core.losses.representation.Fields`."""
 
     state: Staggered
     grid: StaggeredGrid

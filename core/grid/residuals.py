@@ -9,8 +9,8 @@ is far above 2 and nothing else holds it.
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.boussinesq import Numbers, Residuals
 from core.grid.staggered import Staggered, StaggeredGrid
+from core.losses.boussinesq import Numbers, Residuals
 
 Volume = Float[Array, "_ _ _"]
 

@@ -13,8 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from core.boussinesq import Flow
 from core.grid.interpolation import at_points, interpolation_matrix, on_axes, on_axes_together
+from core.losses.boussinesq import Flow
 
 Corner = tuple[float, float, float]
 Shape = tuple[int, int, int]

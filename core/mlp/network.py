@@ -9,9 +9,9 @@ import jax.numpy as jnp
 from jax.typing import DTypeLike
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from core.boussinesq import Flow, Numbers, Residuals, residuals
+from core.losses.boussinesq import Flow, Numbers, Residuals, residuals
+from core.losses.representation import Spans, points_of
 from core.mlp.propagation import Activation, activate, propagate_activation, propagate_linear
-from core.representation import Spans, points_of
 from core.setting import SettingError, setting
 
 Corner = tuple[float, float, float]

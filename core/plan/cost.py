@@ -13,15 +13,15 @@ from typing import Literal
 
 import numpy as np
 
+from core.estimate.forward_runs import RoomSettings
+from core.estimate.prior import room_prior
 from core.plan.expected import ExpectedFlow
 from core.problem import Problem
+from core.room.forward import closure_name, room
 from core.room.grid import WALLS
-from core.room.prior import room_prior
-from core.room.room import closure_name, room
-from core.room.runs import RoomSettings
 from core.scene import Heater, Inlet, Wall
 from core.setting import setting
-from core.solve.draft import draft_grid
+from core.solve.draft.draft import draft_grid
 from core.solve.recipes import PAPER_STEPS
 
 # Iterations of `draft` without a plane over those with one: 55 over 35, median of six rooms.

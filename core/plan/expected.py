@@ -11,14 +11,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from core.air import Air
+from core.estimate.forward_runs import RoomSettings, settled
+from core.estimate.plane_openings import with_plane_openings
+from core.estimate.prior import room_prior
 from core.fields import SplineField, plume, through_vertices
-from core.knowledge import VertexGrid
+from core.known import VertexGrid
 from core.problem import Problem
+from core.room.forward import closure_name, room
 from core.room.model import longest_step_s
-from core.room.plane_openings import with_plane_openings
-from core.room.prior import room_prior
-from core.room.room import closure_name, room
-from core.room.runs import RoomSettings, settled
 from core.scene import Heater, Inlet, Scene, Wall
 from core.setting import SettingError
 

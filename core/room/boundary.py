@@ -1,4 +1,4 @@
-"""What the six walls do to the air: arrays over each wall's cells, made by `core.room.setup`.
+"""What the six walls do to the air: arrays over each wall's cells, made by `core.room.boundary_conditions`.
 
 A patch covers a fraction f of each cell face. Its volume flow f U is exact then, but its momentum flux
 f U^2 is not (f U)^2: the missing U^2 (f - f^2) is a force on the first cells, without which a jet on an

@@ -9,9 +9,9 @@ from core.mlp import MlpSettings
 from core.problem import Problem
 from core.result import Solution
 from core.solve.checkpoint import CheckpointStore
-from core.solve.grid import GridSettings, solve_grid
+from core.solve.grid.grid import GridSettings, solve_grid
 from core.solve.loop import LoopSettings
-from core.solve.mlp import MlpSolveSettings, solve_mlp
+from core.solve.network.mlp import MlpSolveSettings, solve_mlp
 from core.solve.regime import Regime, Weights
 
 OnEvent = Callable[[dict[str, Any]], object]

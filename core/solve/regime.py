@@ -7,17 +7,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from core.boundary import boundary_loss, level_loss, point_losses
-from core.image_rows import pixel_centres, rendered_rows, warped_rows
-from core.losses import Loss, PhysicsLoss, PriorLoss, SmoothnessLoss
+from core.losses.boundary import boundary_loss, level_loss, point_losses
+from core.losses.image_rows import pixel_centres, rendered_rows, warped_rows
+from core.losses.physics import Loss, PhysicsLoss, PriorLoss, SmoothnessLoss
+from core.losses.shifts import ShiftLoss, ShiftRows, displacement_rows, similarity_basis
+from core.losses.traced import TracedLoss, rendered_view, traced_windows
 from core.problem import ImagePair, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.rays.optics import pinhole
 from core.scene import Scene
 from core.setting import SettingError, setting
-from core.shift_loss import ShiftLoss, ShiftRows, displacement_rows, similarity_basis
-from core.solve.frame import Frame, height_profile
-from core.traced_loss import TracedLoss, rendered_view, traced_windows
+from core.solve.nondimensional import Frame, height_profile
 
 Regime = Literal["bos+boundary", "pde+boundary", "bos+pde+boundary"]
 # Slopes of room air that a smoothness belief allows, as in the `draft` preset.

@@ -1,24 +1,17 @@
 """Solve by a room that is marched in time and whose boundary the images correct.
 
 A coarse room settles, a finer one starts from it, and the misfit with the data corrects what was stated
-(`core.room.rounds`). What comes out carries standard deviations: the parameters' posterior, and what the grid and
-the closure cannot represent, from the differences of two grids and of two closures.
+(`core.estimate.parameter_fit`). What comes out carries standard deviations: the parameters' posterior, and what the
+grid and the closure cannot represent, from the differences of two grids and of two closures.
 """
 
 import time
 
 import numpy as np
 
-from core.problem import Problem
-from core.result import Solution
-from core.room.answer import Solved, solution
-from core.room.observe import Observations, observations
-from core.room.plane_openings import with_plane_openings
-from core.room.prior import room_prior
-from core.room.rivals import HEAT_WORTHWHILE, left_over, promising_closure, suspected_heat
-from core.room.room import carried_over, closure_name, room
-from core.room.rounds import Begun, coarse_fit, fine_fit, held_fit
-from core.room.runs import (
+from core.estimate.alternatives import HEAT_WORTHWHILE, left_over, promising_closure, suspected_heat
+from core.estimate.diagnostics import another_closure
+from core.estimate.forward_runs import (
     Attempt,
     Derivatives,
     Event,
@@ -28,10 +21,17 @@ from core.room.runs import (
     perturbed,
     settled,
 )
-from core.room.search import fine_search
-from core.room.sentences import another_closure
-from core.room.setup import RoomLayout
-from core.room.steps import Vector
+from core.estimate.levenberg_marquardt import fine_search
+from core.estimate.observation import Observations, observations
+from core.estimate.parameter_fit import Begun, coarse_fit, fine_fit, held_fit
+from core.estimate.parameter_step import Vector
+from core.estimate.plane_openings import with_plane_openings
+from core.estimate.posterior import Solved, solution
+from core.estimate.prior import room_prior
+from core.problem import Problem
+from core.result import Solution
+from core.room.boundary_conditions import RoomLayout
+from core.room.forward import carried_over, closure_name, room
 
 
 def solve_room(
@@ -40,7 +40,7 @@ def solve_room(
     """T, p and u of the room, with deviations and sentences about what the images contradict.
 
     Raises:
-        SettingError: a boundary that cannot be (see `core.room.setup`).
+        SettingError: a boundary that cannot be (see `core.room.boundary_conditions`).
     """
     start_s = time.perf_counter()
     tell: Event = on_event or (lambda _: None)

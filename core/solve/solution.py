@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import equinox as eqx
 import numpy as np
 
-from core.boussinesq import Flow
-from core.representation import Spans, Unknowns, positions
+from core.losses.boussinesq import Flow
+from core.losses.representation import Spans, Unknowns, positions
 from core.result import Outcome, Solution
-from core.solve.frame import Frame
+from core.solve.nondimensional import Frame
 
 
 def solution_of(

@@ -1,4 +1,4 @@
-"""Simulated twins of the devices, behind the same Protocols. Used by `app.rig` and tests only."""
+"""Simulated twins of the devices, behind the same Protocols. Used by `app.rig.open` and tests only."""
 
 from drivers.simulated.camera import SimulatedCamera as SimulatedCamera
 from drivers.simulated.clock import VirtualClock as VirtualClock

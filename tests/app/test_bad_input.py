@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.capture.burst import take
 from app.errors import BadInputError
-from app.experiment import ExperimentSettings, create_experiment
+from app.experiment.folder import ExperimentSettings, create_experiment
 from app.pipeline import reconstruct
-from app.taking import take
 from core.geometry import Box, looking_along_y
 from core.scene import CameraNoise, FixedTexture, Inlet, Outlet, Patch, Scene, View
 from core.setting import SettingError

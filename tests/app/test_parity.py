@@ -10,7 +10,7 @@ import pytest
 from fastapi import FastAPI
 
 from app.api import create_app
-from app.api.settings import new_token, service_config
+from app.api.security.settings import new_token, service_config
 from app.commands.remote import requests
 
 SOURCES = Path(__file__).resolve().parents[2] / "web" / "src"

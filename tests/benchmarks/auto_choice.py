@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from app.ray_sweep import DEAREST_ORDER, DEAREST_STEPS, KINDS, Traced, traced
+from app.bench.parts.ray_sweep import DEAREST_ORDER, DEAREST_STEPS, KINDS, Traced, traced
 from core.plan.choice import SHARE
 from core.plan.choices import resolve
 from core.plan.expected import expected_flow

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from calibration.bundle import from_json
-from tests.app.test_calibrate_live import NOISE, angle_deg, experiment, run
+from tests.app.calibrate.test_terminal import NOISE, angle_deg, experiment, run
 
 
 def main() -> None:

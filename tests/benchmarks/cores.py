@@ -34,7 +34,7 @@ def measure(cores: int) -> None:
     import equinox as eqx
     import jax.numpy as jnp
 
-    from app import operator_trade, ray_trade
+    from app.bench.parts import operator_trade, ray_trade
 
     field, rays = ray_trade.single(ray_trade.grid64(10.0)), ray_trade.single(ray_trade.bundle(30.0, RAYS))
     found = {}

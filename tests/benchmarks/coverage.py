@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.benches.room_fit import coverage, problem_of
-from app.score import score_solution
+from app.bench.room_fit import coverage, problem_of
+from app.volume.score import score_solution
 from core.problem import Problem
 from core.scene import BoundaryInformation, Heater, Inlet, Outlet, Wall
 from core.solve.room import RoomSettings, begin, finish

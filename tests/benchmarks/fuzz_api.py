@@ -27,8 +27,8 @@ from schemathesis.specs.openapi.checks import (
 )
 
 from app.api import Limits, create_app
+from app.api.security.settings import new_token, service_config
 from app.api.server import listen, serving
-from app.api.settings import new_token, service_config
 
 CHECKS = [
     status_code_conformance,

@@ -38,7 +38,7 @@ from pathlib import Path
 import numpy as np
 from app.api import create_app
 from app.api.server import listen, server_of
-from app.api.settings import service_config
+from app.api.security.settings import service_config
 from drivers.simulated import SimulatedCamera
 
 

@@ -12,13 +12,13 @@ import time
 from pathlib import Path
 from typing import Any
 
-from app.benches.room_fit import problem_of
-from app.score import score_solution
-from app.truth import RoomVolume
+from app.bench.room_fit import problem_of
+from app.volume.file import RoomVolume
+from app.volume.score import score_solution
 from core.mlp import MlpSettings
 from core.result import Solution
 from core.solve.loop import LoopSettings
-from core.solve.mlp import MlpSolveSettings, solve_mlp
+from core.solve.network.mlp import MlpSolveSettings, solve_mlp
 from core.solve.room import RoomSettings, solve_room
 from tests.benchmarks.options import whole_numbers
 

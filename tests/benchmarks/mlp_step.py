@@ -10,7 +10,7 @@ import time
 import jax
 import jax.numpy as jnp
 
-from core.boussinesq import Flow, Numbers, residuals
+from core.losses.boussinesq import Flow, Numbers, residuals
 from core.mlp import Mlp, MlpSettings, initial_mlp
 from tests.benchmarks.options import whole_numbers
 

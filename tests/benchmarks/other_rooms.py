@@ -18,14 +18,14 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from app.room_scene import RigOptions, room_scene
-from app.truth import RoomVolume
+from app.volume.file import RoomVolume
+from app.volume.scene import RigOptions, room_scene
+from core.estimate.prior import room_prior
 from core.problem import Problem
+from core.room.forward import Room, carried_over, room, seen
 from core.room.grid import AXES
 from core.room.march import MarchSettings, march
 from core.room.model import RoomModel
-from core.room.prior import room_prior
-from core.room.room import Room, carried_over, room, seen
 from core.room.vertices import cell_matrix
 
 T0_K, NU, PRANDTL = 293.15, 1.5e-5, 0.71

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
-from app.experiment import write_manifest
+from app.experiment.folder import write_manifest
+from app.experiment.results import write_result
 from app.jobs import JobSpec
-from app.rehearsal import Rehearsal, rehearse
-from app.results import write_result
+from app.simulate.rehearsal import Rehearsal, rehearse
 from core.result import Solution
 from drivers.simulated import SimulatedCamera
 from tests.browser.conftest import CHROMIUM, FLAGS, Station

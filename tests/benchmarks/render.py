@@ -14,7 +14,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from app.ray_trade import AIR, ROOM
+from app.bench.parts.ray_trade import AIR, ROOM
 from core.fields import GridField, plume
 from core.geometry import looking_along_y
 from core.render import pixel_renderer, render_flow, render_reference

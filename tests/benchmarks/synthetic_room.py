@@ -20,8 +20,8 @@ from core.grid.multiresolution import prolong
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.scene import FixedTexture, FlowModel, PlaneField, Scene, View, Wall
-from core.solve.frame import Frame, frame_of
-from core.solve.grid import GridSettings, solve_grid
+from core.solve.grid.grid import GridSettings, solve_grid
+from core.solve.nondimensional import Frame, frame_of
 from core.solve.regime import DataModel
 from tests.benchmarks.options import whole_numbers
 

@@ -20,7 +20,7 @@ from drivers.simulated.projector.engine import ProjectorFault, SimulatedProjecto
 from drivers.simulated.projector.escvp21 import EscVp21Twin
 from drivers.simulated.projector.hosts import LoopPort
 from drivers.simulated.projector.state import ProjectorState
-from tests.app.test_live import SCENE
+from tests.app.rig.test_live_camera import SCENE
 from tests.browser.conftest import Opens, Station, snapshot
 
 

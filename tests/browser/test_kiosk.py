@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.kiosk_screen import KioskScreen
-from app.kiosk_server import serve_kiosk
+from app.kiosk.screen import KioskScreen
+from app.kiosk.server import serve_kiosk
 from drivers.errors import DeviceSettingError
 
 NEEDED = ("chromium", "Xvfb", "matchbox-window-manager")

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import Locator, Page, expect
 
-from app.durable import write_json, write_text
-from app.experiment import Experiment, write_manifest
-from app.rehearsal import SAMPLE_ROOM
-from app.results import write_result
-from app.truth import read_volume
+from app.experiment.folder import Experiment, write_manifest
+from app.experiment.results import write_result
+from app.files.durable import write_json, write_text
+from app.simulate.rehearsal import SAMPLE_ROOM
+from app.volume.file import read_volume
 from core.result import Outcome, Solution
 from tests.browser.conftest import Opens, Station, snapshot
 

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import expect
 
 from drivers.simulated import CameraFault, SimulatedCamera
-from tests.app.test_live import SCENE
+from tests.app.rig.test_live_camera import SCENE
 from tests.browser.conftest import PAGE, Opens, Station, snapshot
 
 ROOT = PAGE.parents[1]

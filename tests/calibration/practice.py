@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from calibration.board import Board
-from calibration.rehearsal import Sheet
+from calibration.simulated_pictures import Sheet
 from core.geometry import Optics, looking_along_y, rotation_vector
 
 # World axes of a board that faces the camera: x right, y down, normal away from the camera.

@@ -3,7 +3,7 @@ import pytest
 
 from calibration.board import CharucoBoard, Chessboard, CircleGrid
 from calibration.errors import CalibrationError
-from calibration.rehearsal import look
+from calibration.simulated_pictures import look
 from calibration.views import view_of
 from tests.calibration.practice import exposed, project, rig, standing
 

@@ -8,8 +8,8 @@ import pytest
 from calibration.bundle import CalibratedOptics, given_bundle
 from calibration.errors import BundleError
 from calibration.handover import pixel_rays, wall_to_panel, warnings_for
-from calibration.rehearsal import rays_of
 from calibration.sensitivity import shift_uncertainty
+from calibration.simulated_pictures import rays_of
 from calibration.world import shifted
 from core.rays.optics import pinhole
 from tests.calibration.practice import project, rig

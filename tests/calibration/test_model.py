@@ -18,7 +18,7 @@ from calibration.record import (
     rows_of,
     seen_board,
 )
-from calibration.rehearsal import look
+from calibration.simulated_pictures import look
 from calibration.stripes import stripe_edges
 from calibration.views import digest, view_of
 from calibration.wall import correspondences

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.boundary_files import read_plane, read_planes, read_sensor_table
-from app.capture_files import read_image
-from app.configuration import read_toml, to_toml
-from app.experiment import Experiment, ExperimentSettings, open_experiment
-from app.truth import read_volume
+from app.experiment.boundary import read_plane, read_planes, read_sensor_table
+from app.experiment.capture_files import read_image
+from app.experiment.folder import Experiment, ExperimentSettings, open_experiment
+from app.files.toml import read_toml, to_toml
+from app.volume.file import read_volume
 from core.geometry import Box, looking_along_y
 from core.scene import FixedTexture, PlaneField, Scene, View
 from tests.extremes.row import Named, Near, Refused, Row, extremes, prove

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from core.geometry import Box, looking_along_y
-from core.knowledge import VertexGrid, known_temperature
+from core.known import VertexGrid, known_temperature
 from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, SolveModel, View, Wall
 from core.solve.check import check_problem
-from core.solve.draft import draft_grid, solve_draft
+from core.solve.draft.draft import draft_grid, solve_draft
 from tests.extremes.row import Near, Refused, Row, Within, extremes, prove
 
 STAGE = "draft"

@@ -6,10 +6,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from core.air import Air
-from core.boussinesq import Flow, Numbers, Scales, residuals, scales
+from core.estimate.uncertainty import Represented, deviation
 from core.grid import Staggered, StaggeredGrid, discrete_residuals
+from core.losses.boussinesq import Flow, Numbers, Scales, residuals, scales
 from core.metrics import score_pressure, score_temperature, score_velocity
-from core.uncertainty import Represented, deviation
 from tests.extremes.row import Near, Refused, Row, Within, extremes, prove
 
 STAGE = "flow"

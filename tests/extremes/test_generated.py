@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from core.air import Air
-from core.boussinesq import scales
 from core.displacement import measure_shift
 from core.fields import GridField
 from core.geometry import Box, looking_along_y
+from core.losses.boussinesq import scales
 from core.rays import NonlinearTracer, Rays
 from core.rays.bundle import clip_ray
 from core.scene import FixedTexture, Inlet, Patch, Scene, View

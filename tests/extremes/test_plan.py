@@ -6,7 +6,7 @@ from core.plan.cost import draft_work, grid_work, level_of
 from core.plan.expected import expected_flow
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import signal
-from core.plan.words import verdict
+from core.plan.verdicts import verdict
 from core.problem import Problem
 from core.scene import CameraNoise, FixedTexture, Scene
 from tests.core.plan.scenes import bench

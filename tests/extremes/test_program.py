@@ -11,15 +11,15 @@ import pytest
 from core.geometry import Box, looking_along_y
 from core.grid.multiresolution import MultiGrid, zero_multigrid
 from core.grid.staggered import StaggeredGrid
-from core.losses import all_rows
+from core.losses.physics import all_rows
+from core.losses.representation import Unknowns
 from core.problem import Problem, SensorData, ShiftMeasurement
 from core.rays import StraightTracer
 from core.rays.operator import build
 from core.render import pixel_geometry
 from core.render.shift import wall_offset_m
-from core.representation import Unknowns
 from core.scene import FixedTexture, Light, PointSensors, ProjectedPattern, Scene, View
-from core.solve.frame import frame_of
+from core.solve.nondimensional import frame_of
 from core.solve.regime import DataModel, Weights, losses_of
 from tests.extremes.test_render import field
 

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy import ndimage
 
-from app.displacement import shift_field
-from app.measure import frame_variance
+from app.reconstruct.measure import frame_variance
+from app.report.displacement import shift_field
 from core.displacement import (
     Similarity,
     fit_similarity,

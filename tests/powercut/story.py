@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from app import worker
-from app.capture import load_capture, write_capture
 from app.errors import AirlensError
+from app.experiment.captures import load_capture, write_capture
 from app.jobs import Job, JobSpec, JobState, Ledger
 from app.jobs.folder import JobFolder, Owner
 from drivers.burst import Burst, CapturePlan

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from app.rig_settings import SimulatedCameraSettings
-from app.room_scene import RigOptions
-from app.simulate import simulate
+from app.experiment.rig_settings import SimulatedCameraSettings
+from app.simulate.experiment import simulate
+from app.volume.scene import RigOptions
 
-ROOM = Path(str(files("app.sample") / "room.npz"))
+ROOM = Path(str(files("app.simulate.sample") / "room.npz"))
 
 
 @pytest.fixture(scope="session")

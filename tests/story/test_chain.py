@@ -12,14 +12,14 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 
 from app.errors import BadInputError
-from app.experiment import interrupted, open_experiment, read_manifest
-from app.export import export
+from app.experiment.folder import interrupted, open_experiment, read_manifest
+from app.experiment.plan import read_plan
 from app.pipeline import reconstruct
-from app.plan import plan
-from app.plan_record import read_plan
-from app.presets import PRESETS
-from app.score import score_experiment
-from app.simulate import simulate
+from app.plan.make import plan
+from app.reconstruct.presets import PRESETS
+from app.report.export import export
+from app.simulate.experiment import simulate
+from app.volume.score import score_experiment
 from core.displacement import standard_deviation_px
 from tests.story.conftest import ROOM
 
@@ -134,8 +134,8 @@ def test_a_result_folder_without_manifest_is_interrupted_and_never_used(done, ex
 
 
 def test_an_experiment_is_not_overwritten(experiment):
-    from app.rig_settings import SimulatedCameraSettings
-    from app.room_scene import RigOptions
+    from app.experiment.rig_settings import SimulatedCameraSettings
+    from app.volume.scene import RigOptions
 
     with pytest.raises(BadInputError, match="not empty"):
         simulate(ROOM, experiment, RigOptions(), "paper", SimulatedCameraSettings())

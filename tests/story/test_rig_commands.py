@@ -9,10 +9,10 @@ from typer.testing import CliRunner
 import app
 from app.cli import create_cli
 from app.errors import AirlensError
-from app.experiment import open_experiment
-from app.rig_settings import SimulatedCameraSettings
-from app.room_scene import RigOptions
-from app.simulate import simulate
+from app.experiment.folder import open_experiment
+from app.experiment.rig_settings import SimulatedCameraSettings
+from app.simulate.experiment import simulate
+from app.volume.scene import RigOptions
 from drivers.errors import DeviceNotFoundError
 
 

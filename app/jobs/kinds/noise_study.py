@@ -14,8 +14,8 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from app.configuration import Strict, parse
-from app.durable import durable_path
+from app.files.durable import durable_path
+from app.files.toml import Strict, parse
 from app.jobs.task import CheckpointClock, Task
 
 EXPERIMENT = False

@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import Field
 
-from app.configuration import Strict, parse
+from app.files.toml import Strict, parse
 from app.jobs.task import Task
 
 EXPERIMENT = True
@@ -25,7 +25,7 @@ def read(settings: Mapping[str, Any]) -> PlanSettings:
 def run(task: Task, settings: PlanSettings) -> dict[str, Any]:
     """Plan; return the verdicts."""
     # Imported here: reading a job's settings must not cost the start of the array library.
-    from app.plan import plan
+    from app.plan.make import plan
 
     def on_stage(stage: str) -> None:
         task.check_stop()

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import Field
 
-from app.configuration import Strict, parse
+from app.files.toml import Strict, parse
 from app.jobs.checkpoints import FolderStore
 from app.jobs.task import Task
 

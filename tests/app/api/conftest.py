@@ -9,8 +9,8 @@ import pytest
 from fastapi import FastAPI
 
 from app.api import ServiceConfig, create_app
+from app.api.security.settings import new_token, service_config
 from app.api.server import listen, serving
-from app.api.settings import new_token, service_config
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.client import Client, ServiceError
-from app.rig import open_camera
+from app.rig.open import open_camera
 from drivers.simulated import CameraFault, SimulatedCamera
 from tests.app.api.conftest import Live
 

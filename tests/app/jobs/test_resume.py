@@ -12,10 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import create_cli
+from app.experiment.results import read_result
 from app.jobs import JobSpec, Ledger
 from app.jobs.folder import JobFolder, Owner
 from app.jobs.worker_status import DONE
-from app.results import read_result
 from core.solve.checkpoint import decode
 
 ROOT = Path(__file__).parents[3]
@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[3]
 @pytest.fixture(scope="module")
 def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("rig") / "experiment"
-    with (files("app.sample") / "room.npz").open() as truth:
+    with (files("app.simulate.sample") / "room.npz").open() as truth:
         options = ["--truth", truth.name, "--camera-px", "160", "--frames", "2"]
     CliRunner().invoke(create_cli(), ["simulate", str(folder), *options], catch_exceptions=False)
     settings = folder / "experiment.toml"

@@ -3,10 +3,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.boussinesq import Flow, Numbers, residuals
 from core.grid import Staggered, StaggeredGrid, discrete_residuals
 from core.grid.interpolation import interpolation_matrix
 from core.grid.multiresolution import MultiGrid, prolong, zero_multigrid
+from core.losses.boussinesq import Flow, Numbers, residuals
 
 NUMBERS = Numbers(reynolds=40.0, peclet=30.0, richardson=2.5)
 LOWER, UPPER = (0.0, 0.0, 0.0), (1.4, 1.0, 1.0)

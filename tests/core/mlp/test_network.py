@@ -3,7 +3,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.boussinesq import Flow
+from core.losses.boussinesq import Flow
 from core.mlp import MlpSettings, initial_mlp
 from core.setting import SettingError
 

@@ -9,10 +9,10 @@ from core.air import Air
 from core.displacement import measure_shift
 from core.plan.choices import resolve
 from core.plan.expected import expected_flow
-from core.plan.seen import seen
+from core.plan.observability import seen
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import signal
-from core.plan.words import verdict
+from core.plan.verdicts import verdict
 from core.problem import Problem
 from core.render import render_flow, render_reference
 from core.scene import Inlet, Outlet, Patch, Scene, Wall

@@ -9,9 +9,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.boussinesq import Numbers
 from core.grid import Staggered, StaggeredGrid, discrete_residuals
-from core.solve.gauss_newton import column_scale, gauss_newton_step
+from core.losses.boussinesq import Numbers
+from core.solve.grid.gauss_newton import column_scale, gauss_newton_step
 
 PRANDTL = 0.71
 # Mean Nusselt numbers of the benchmark solution.

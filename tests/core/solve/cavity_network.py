@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from core.boussinesq import Flow, Numbers, residuals
+from core.losses.boussinesq import Flow, Numbers, residuals
 from core.mlp import Mlp, MlpSettings, initial_mlp
 
 # Weight of a wall's errors over the residuals' within. With 10 the walls hide the equations for a hundred steps.

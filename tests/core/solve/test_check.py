@@ -10,8 +10,8 @@ from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, View, Wall
 from core.setting import SettingError
 from core.solve.check import check_problem
-from core.solve.frame import frame_of
-from core.solve.grid import GridSettings
+from core.solve.grid.grid import GridSettings
+from core.solve.nondimensional import frame_of
 from core.solve.regime import DataModel, Weights, losses_of
 
 PATCH = Patch(wall="x_min", lower_m=(1.0, 2.0), upper_m=(2.0, 2.5))

@@ -6,16 +6,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.boundary import level_loss
 from core.geometry import Box, looking_along_y
-from core.knowledge import VertexGrid
+from core.known import VertexGrid
+from core.losses.boundary import level_loss
+from core.losses.representation import Unknowns
 from core.problem import Problem, ShiftMeasurement
 from core.rays.operator import build
-from core.representation import Unknowns
 from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, SolveModel, View
-from core.solve.draft import solve_draft
-from core.solve.frame import frame_of
-from core.solve.grid import GridSettings, initial_unknowns
+from core.solve.draft.draft import solve_draft
+from core.solve.grid.grid import GridSettings, initial_unknowns
+from core.solve.nondimensional import frame_of
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(4.0, 3.0, 3.0))
 OUTLET = Outlet(

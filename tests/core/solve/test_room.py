@@ -6,18 +6,18 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from core.estimate.alternatives import promising_closure
+from core.estimate.forward_runs import Derivatives, attempt
+from core.estimate.heaters import heaters_by_march
+from core.estimate.levenberg_marquardt import fine_search
+from core.estimate.observation import observations
+from core.estimate.parameter_fit import Begun, coarse_fit, fine_fit
+from core.estimate.parameter_step import misfit_ratio
+from core.estimate.posterior import Solved, solution
 from core.geometry import Box, looking_along_y
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.result import Solution
-from core.room.answer import Solved, solution
-from core.room.heaters import heaters_by_march
-from core.room.observe import observations
-from core.room.rivals import promising_closure
-from core.room.rounds import Begun, coarse_fit, fine_fit
-from core.room.runs import Derivatives, attempt
-from core.room.search import fine_search
-from core.room.steps import misfit_ratio
 from core.scene import FixedTexture, FlowModel, Heater, Inlet, Outlet, Patch, Scene, View, Wall
 from core.solve.room import (
     RoomSettings,

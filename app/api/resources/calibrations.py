@@ -1,0 +1,178 @@
+"""Calibrations: what is known of camera, projector and wall, how well, and what to do about it."""
+
+from typing import Literal
+
+import numpy as np
+from fastapi import APIRouter
+from jaxtyping import Float
+
+from app.api.services import Given
+from app.api.wire.problems import ApiError
+from app.api.wire.strict import Identifier, Strict
+from app.calibrate.guide import StepName
+from app.calibrate.parts import Part, PartState, bundle_of, is_calibrated, parts_of
+from app.experiment.folder import Experiment
+from app.simulate.rehearsal import calibrate_simulated
+from calibration.bundle import Bundle, CalibratedOptics
+from core.geometry import Optics, Vector3
+
+router = APIRouter(tags=["calibrations"])
+
+# What each part is called, and what stands in for it.
+_WITHOUT = {
+    StepName.camera: ("camera", "The optics written in experiment.toml are used."),
+    StepName.projector: ("projector", "The optics written in experiment.toml are used."),
+    StepName.wall: ("back wall", "The rig stands in a frame of its own, not yet in the room."),
+    StepName.response: ("response", "The noise written in experiment.toml is used."),
+}
+
+
+class CalibrationItem(Strict):
+    """One thing to calibrate, in words for the operator: measured from images, given, or missing."""
+
+    name: str
+    state: PartState
+    value: str
+    advice: str
+
+
+class StandingResource(Strict):
+    """Where a camera or a projector stands, and where the corners of its picture meet the back wall [m]."""
+
+    name: str
+    role: Literal["camera", "projector"]
+    position_m: list[float]
+    corners_m: list[list[float]]
+
+
+class CalibrationResource(Strict):
+    """The calibration of an experiment; `room_m` are the room's lower and upper corner.
+
+    Incomplete while a part that the rig needs is missing: camera, wall, and the projector where it is the light.
+    """
+
+    state: Literal["calibrated", "incomplete"]
+    date: str | None
+    items: list[CalibrationItem]
+    room_m: list[list[float]]
+    rig: list[StandingResource]
+
+
+class NewCalibration(Strict):
+    """A simulated rig takes its models from its scene; a real one is calibrated on the command line."""
+
+    kind: Literal["simulated"]
+
+
+@router.get("/experiments/{experiment}/calibration")
+def read_calibration(given: Given, experiment: Identifier) -> CalibrationResource:
+    """Return the calibration in use; of a rig that nobody has calibrated, that everything is missing."""
+    return _resource(given.folders.open(experiment))
+
+
+@router.post("/experiments/{experiment}/calibration", status_code=201)
+def calibrate(given: Given, experiment: Identifier, new: NewCalibration) -> CalibrationResource:
+    """Calibrate a simulated rig, in one step."""
+    found = given.folders.open(experiment)
+    if found.settings.rig.camera.kind != new.kind:
+        raise ApiError(
+            "conflict", "This rig is real: its models come from images.", "Run `airlens calibrate` on it."
+        )
+    calibrate_simulated(found)
+    given.ledger.append_event("experiment", {"experiment": experiment, "calibrated": True})
+    return _resource(found)
+
+
+def _resource(experiment: Experiment) -> CalibrationResource:
+    bundle, parts = bundle_of(experiment), parts_of(experiment)
+    room = experiment.settings.scene.room
+    return CalibrationResource(
+        state="calibrated" if is_calibrated(parts) else "incomplete",
+        date=bundle.date if experiment.bundle_path.is_file() else None,
+        items=[*_items(bundle), *(_missing(part) for part in parts if part.state == "missing")],
+        room_m=[list(room.lower_m), list(room.upper_m)],
+        rig=_rig(bundle, room.upper_m),
+    )
+
+
+def _rig(bundle: Bundle, beyond_m: Vector3) -> list[StandingResource]:
+    """Every optics with the corners of its picture on the wall: as calibrated, or the room's own back wall."""
+    wall = bundle.wall
+    point = np.array(beyond_m if wall is None else wall.point_m)
+    normal = np.array((0.0, 1.0, 0.0) if wall is None else wall.normal)
+    projector = () if bundle.projector is None else (bundle.projector,)
+    return [
+        StandingResource(
+            name=one.name,
+            role="projector" if one is bundle.projector else "camera",
+            position_m=list(one.optics.position_m),
+            corners_m=_corners(one.optics, point, normal),
+        )
+        for one in (*bundle.cameras, *projector)
+    ]
+
+
+def _corners(
+    optics: Optics, point_m: Float[np.ndarray, "3"], normal: Float[np.ndarray, "3"]
+) -> list[list[float]]:
+    """Where the picture's corners meet a plane; distortion is left out, for it bends no picture of a rig."""
+    start = np.array(optics.position_m)
+    found = []
+    for u, v in ((0, 0), (optics.width_px, 0), (optics.width_px, optics.height_px), (0, optics.height_px)):
+        ray = [
+            (u - optics.principal_px[0]) / optics.focal_px[0],
+            (v - optics.principal_px[1]) / optics.focal_px[1],
+        ]
+        direction = optics.rotation.T @ np.array([*ray, 1.0])
+        ahead = float(normal @ direction)
+        length = float(normal @ (point_m - start)) / ahead if abs(ahead) > 1e-6 else 1.0
+        found.append([float(part) for part in start + length * direction])
+    return found
+
+
+def _items(bundle: Bundle) -> list[CalibrationItem]:
+    projector = () if bundle.projector is None else (bundle.projector,)
+    items = [_optics(one) for one in (*bundle.cameras, *projector)]
+    if bundle.wall is not None:
+        x, y, z = bundle.wall.point_m
+        plane = f"plane through ({x:.3f}, {y:.3f}, {z:.3f}) m"
+        items.append(
+            CalibrationItem(
+                name="back wall",
+                state=bundle.wall.quality.source,
+                value=plane,
+                advice=_advice(bundle.wall.quality.advice),
+            )
+        )
+    for response in bundle.camera_responses:
+        value = f"dark {response.dark_counts:.1f} counts, {response.bits} bit"
+        name, source = f"response of {response.name}", response.quality.source
+        items.append(CalibrationItem(name=name, state=source, value=value, advice=""))
+    return items
+
+
+def _missing(part: Part) -> CalibrationItem:
+    name, standing = _WITHOUT[part.step]
+    advice = f"{standing} Take the step '{part.step}'{'' if part.needed else ' where noise matters'}."
+    return CalibrationItem(name=name, state="missing", value="not calibrated", advice=advice)
+
+
+def _optics(one: CalibratedOptics) -> CalibrationItem:
+    quality = one.quality
+    focal_px = one.optics.focal_px[0]
+    known = (
+        "given, not measured"
+        if quality.source == "given"
+        else f"residual {quality.reprojection_rms_px:.3f} px over {quality.views} views, "
+        f"{100 * quality.coverage:.0f} % of the image covered"
+    )
+    return CalibrationItem(
+        name=one.name,
+        state=quality.source,
+        value=f"focal length {focal_px:.1f} px; {known}",
+        advice=_advice(quality.advice),
+    )
+
+
+def _advice(advice: tuple[str, ...]) -> str:
+    return " ".join(advice) or "Nothing to do."

@@ -1,0 +1,239 @@
+"""Captures: take, watch, abort, keep or discard, look at, annotate."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import cv2
+import numpy as np
+from fastapi import APIRouter, Query, Response
+from pydantic import Field
+
+from app.api.folders import child
+from app.api.services import Given, Services
+from app.api.wire.bodies import body
+from app.api.wire.problems import ApiError
+from app.api.wire.strict import Identifier, Strict
+from app.api.wire.volumes import Encoding, pack
+from app.experiment.capture_files import BurstImage
+from app.experiment.captures import load_capture
+from app.experiment.folder import read_manifest
+from app.files.durable import write_text
+from drivers.burst import CapturePlan
+
+router = APIRouter(tags=["captures"])
+NOTES = "notes.txt"
+Role = Literal["reference", "flow", "dark", "flat"]
+PICTURE = body("image/png", "A picture for the eyes: stretched from the 1st to the 99th percentile.")
+NUMBERS = body("application/octet-stream", "Rows of little-endian numbers; value = X-Offset + X-Scale * n.")
+
+
+class DeskResource(Strict):
+    """The capture that is being taken, or the last one."""
+
+    state: Literal["idle", "running", "finished", "aborted", "incomplete", "failed"]
+    experiment: str | None
+    capture: str | None
+    role: str | None
+    done: int
+    total: int
+    refused: int
+    level: float
+    reason: str
+
+
+class NewCapture(Strict):
+    """A burst; settings that are left out stay as they are."""
+
+    role: Role
+    frames: int = Field(default=100, ge=1, le=100_000)
+    exposure_s: float | None = Field(default=None, gt=0, le=60)
+    gain: float | None = Field(default=None, ge=0, le=1000)
+    settle_s: float = Field(default=0.0, ge=0, le=600)
+    raw_stack: bool = False
+
+
+class Abort(Strict):
+    """What becomes of the frames that were taken."""
+
+    discard: bool = False
+
+
+class VerdictResource(Strict):
+    """One judgement of a burst: `value` against `expected`, and what to do when it is not good."""
+
+    name: str
+    good: bool
+    value: float
+    expected: str
+    advice: str
+
+
+class SettingResource(Strict):
+    """A setting as asked for and as granted."""
+
+    name: str
+    asked: float | None
+    granted: float
+
+
+class CaptureResource(Strict):
+    """One capture. `interrupted` ones have no manifest and are never used as a measurement."""
+
+    capture: str
+    state: Literal["finished", "incomplete", "interrupted"]
+    role: str | None
+    created: str | None
+    frames: int | None
+    width_px: int | None
+    height_px: int | None
+    verdicts: list[VerdictResource]
+    settings: list[SettingResource]
+    notes: str
+
+
+class CaptureChange(Strict):
+    """What people wrote about it."""
+
+    notes: str = Field(max_length=10_000)
+
+
+@router.get("/captures/running")
+async def read_desk(given: Given) -> DeskResource:
+    """Return the capture that is being taken, or the last one."""
+    return DeskResource.of(given.desk.status)
+
+
+@router.post("/captures/running/abort")
+def abort_capture(given: Given, wanted: Abort) -> DeskResource:
+    """End the running capture within a frame."""
+    return DeskResource.of(given.desk.abort(wanted.discard))
+
+
+@router.post("/experiments/{experiment}/captures", status_code=202)
+def start_capture(given: Given, experiment: Identifier, new: NewCapture) -> DeskResource:
+    """Begin a capture; it goes on when the browser is closed."""
+    plan = CapturePlan(
+        kind=new.role,
+        frames=new.frames,
+        exposure_s=new.exposure_s,
+        gain=new.gain,
+        settle_s=new.settle_s,
+        raw_stack=new.raw_stack,
+    )
+    return DeskResource.of(given.desk.start(given.folders.open(experiment), plan))
+
+
+@router.get("/experiments/{experiment}/captures")
+def list_captures(given: Given, experiment: Identifier) -> list[CaptureResource]:
+    """List the captures, newest first; interrupted ones last."""
+    done, broken = given.folders.items(experiment, "capture")
+    return [_resource(folder) for folder in done] + [_interrupted(folder) for folder in broken]
+
+
+@router.get("/experiments/{experiment}/captures/{capture}")
+def read_capture(given: Given, experiment: Identifier, capture: Identifier) -> CaptureResource:
+    """Return one capture."""
+    return _resource(given.folders.item(experiment, "capture", capture))
+
+
+@router.patch("/experiments/{experiment}/captures/{capture}")
+def change_capture(
+    given: Given, experiment: Identifier, capture: Identifier, change: CaptureChange
+) -> CaptureResource:
+    """Write notes beside a capture."""
+    folder = given.folders.item(experiment, "capture", capture)
+    write_text(folder / NOTES, change.notes)
+    return _resource(folder)
+
+
+@router.delete("/experiments/{experiment}/captures/{capture}", status_code=204)
+def discard_capture(given: Given, experiment: Identifier, capture: Identifier) -> None:
+    """Remove a capture, finished or interrupted, with everything in it."""
+    parent = given.folders.folder(experiment) / "captures"
+    found = child(parent, capture)
+    if found is None:
+        raise ApiError("not_found", f"Experiment {experiment!r} has no capture {capture!r}.")
+    if given.desk.status.state.value == "running" and given.desk.status.capture == capture:
+        raise ApiError("conflict", "This capture is being taken.", "Abort it first.")
+    given.folders.remove(found)
+
+
+@router.get(
+    "/experiments/{experiment}/captures/{capture}/picture", response_class=Response, responses=PICTURE
+)
+def read_picture(
+    given: Given,
+    experiment: Identifier,
+    capture: Identifier,
+    width: Annotated[int, Query(ge=16, le=4096, description="At most so many columns.")] = 320,
+    what: Annotated[Literal["mean", "std"], Query()] = "mean",
+) -> Response:
+    """Return a small picture of the mean or of the noise."""
+    image = _image(given, experiment, capture)
+    return Response(_png(image.mean if what == "mean" else image.std, width), media_type="image/png")
+
+
+@router.get("/experiments/{experiment}/captures/{capture}/image", response_class=Response, responses=NUMBERS)
+def read_image(
+    given: Given, experiment: Identifier, capture: Identifier, encoding: Encoding = "f32"
+) -> Response:
+    """Return the mean image as numbers, as fractions of full scale."""
+    packed = pack(_image(given, experiment, capture).mean, encoding)
+    return Response(packed.content, media_type="application/octet-stream", headers=packed.headers)
+
+
+def _image(given: Services, experiment: str, capture: str) -> BurstImage:
+    return load_capture(given.folders.item(experiment, "capture", capture)).images[0]
+
+
+def _png(image: np.ndarray, width: int) -> bytes:
+    step = max(1, -(-image.shape[1] // width))
+    rows, cols = (size // step for size in image.shape)
+    small = cv2.resize(image, (cols, rows), interpolation=cv2.INTER_AREA)
+    low, high = np.percentile(small, (1.0, 99.0))
+    shown = np.clip((small - low) * (255.0 / max(high - low, 1e-9)), 0, 255).astype(np.uint8)
+    done, encoded = cv2.imencode(".png", shown)
+    return encoded.tobytes() if done else b""
+
+
+def _resource(folder: Path) -> CaptureResource:
+    manifest = read_manifest(folder)
+    view = manifest["views"][0]
+    camera = view.get("camera", {})
+    return CaptureResource(
+        capture=folder.name,
+        state="finished" if manifest.get("complete", True) else "incomplete",
+        role=manifest["role"],
+        created=manifest.get("created"),
+        frames=view.get("frames"),
+        width_px=camera.get("width_px"),
+        height_px=camera.get("height_px"),
+        verdicts=[VerdictResource(**_float(one, "value")) for one in view.get("verdicts", [])],
+        settings=[SettingResource(**_float(one, "granted")) for one in view.get("settings", [])],
+        notes=_notes(folder),
+    )
+
+
+def _float(content: dict[str, Any], name: str) -> dict[str, Any]:
+    """JSON writes 1.0 as 1 or 1.0 as its writer likes; ours is a float."""
+    return {**content, name: float(content[name])}
+
+
+def _interrupted(folder: Path) -> CaptureResource:
+    return CaptureResource(
+        capture=folder.name,
+        state="interrupted",
+        role=None,
+        created=None,
+        frames=None,
+        width_px=None,
+        height_px=None,
+        verdicts=[],
+        settings=[],
+        notes=_notes(folder),
+    )
+
+
+def _notes(folder: Path) -> str:
+    path = folder / NOTES
+    return path.read_text(encoding="utf-8") if path.is_file() else ""

@@ -1,0 +1,175 @@
+"""The rig's devices: their states, their settings as read back, and the live picture."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response, WebSocket, WebSocketDisconnect
+from fastapi.responses import StreamingResponse
+from pydantic import Field
+
+from app.api.resources.projector import ProjectorResource, projector_resource
+from app.api.services import Given, services_of
+from app.api.wire.bodies import body
+from app.api.wire.problems import ApiError
+from app.api.wire.strict import Strict
+from app.api.wire.viewer import Viewer
+from app.rig.frame_statistics import LiveFrame
+from app.rig.live_camera import CameraState
+from app.rig.open import open_camera
+
+router = APIRouter(tags=["devices"])
+MJPEG = "multipart/x-mixed-replace; boundary=frame"
+JPEG_BODY = body("image/jpeg", "What the camera sees now.")
+MJPEG_BODY = body("multipart/x-mixed-replace", "JPEG after JPEG, without end.")
+FRAME_LIMIT_S = 3.0
+Stretch = Annotated[Literal["0", "1"], Query(description="1 stretches the contrast, for the eyes only.")]
+
+
+class CameraResource(Strict):
+    """The camera; numbers are null until it is open."""
+
+    device: Literal["camera"] = "camera"
+    state: Literal["closed", "opening", "ready", "capturing", "failed"]
+    experiment: str | None
+    name: str | None
+    width_px: int | None
+    height_px: int | None
+    bits: int | None
+    frame_rate_hz: float | None
+    exposure_s: float | None
+    gain: float | None
+    reason: str
+
+
+class OpenCamera(Strict):
+    """Which rig to connect; `air` is what a simulated room does."""
+
+    experiment: str
+    air: Literal["still", "moving"] = "still"
+
+
+class CameraChange(Strict):
+    """What to set; what is left out stays."""
+
+    exposure_s: float | None = Field(default=None, gt=0, le=60)
+    gain: float | None = Field(default=None, ge=0, le=1000)
+
+
+class Asked(Strict):
+    """What a viewer sends: how many frames it can take now, and how it wants them."""
+
+    credits: int = Field(default=1, ge=0, le=8)
+    stretch: bool = False
+
+
+@router.get("/devices")
+async def list_devices(given: Given) -> list[CameraResource | ProjectorResource]:
+    """List the devices and their states."""
+    return [CameraResource.of(given.camera.status), projector_resource(given.projector.report)]
+
+
+@router.get("/devices/camera")
+async def read_camera(given: Given) -> CameraResource:
+    """Return the camera's state and its settings as read back."""
+    return CameraResource.of(given.camera.status)
+
+
+@router.post("/devices/camera/connect")
+def connect_camera(given: Given, wanted: OpenCamera) -> CameraResource:
+    """Connect, or reconnect, the camera of an experiment's rig."""
+    experiment = given.folders.open(wanted.experiment)
+    status = given.camera.open(wanted.experiment, lambda: open_camera(experiment, wanted.air), wanted.air)
+    return CameraResource.of(status)
+
+
+@router.post("/devices/camera/disconnect")
+def disconnect_camera(given: Given) -> CameraResource:
+    """Let the camera go, for another program."""
+    return CameraResource.of(given.camera.close())
+
+
+@router.patch("/devices/camera")
+def change_camera(given: Given, change: CameraChange) -> CameraResource:
+    """Set exposure and gain; the answer holds what the camera granted."""
+    return CameraResource.of(given.camera.set(change.exposure_s, change.gain))
+
+
+@router.get("/devices/camera/frame", response_class=Response, responses=JPEG_BODY)
+async def read_frame(given: Given, stretch: Stretch = "0") -> Response:
+    """Return one JPEG of what the camera sees now, with its numbers in `X-Statistics`."""
+    if given.camera.status.state not in (CameraState.ready, CameraState.capturing):
+        raise ApiError("conflict", "No camera is connected.", "Connect the camera first.")
+    async with Viewer(given.camera, stretch == "1") as viewer:
+        try:
+            frame = await asyncio.wait_for(viewer.next_frame(), FRAME_LIMIT_S)
+        except TimeoutError:
+            frame = None
+    if frame is None:
+        raise ApiError("unavailable", "The camera showed no frame within 3 s.", "Reconnect it.")
+    return Response(
+        _jpeg(frame, stretch == "1"), media_type="image/jpeg", headers={"X-Statistics": _numbers(frame)}
+    )
+
+
+@router.get("/devices/camera/live.mjpeg", response_class=StreamingResponse, responses=MJPEG_BODY)
+async def stream_mjpeg(given: Given, stretch: Stretch = "0") -> StreamingResponse:
+    """Stream the live picture to a browser without WebSocket."""
+
+    async def parts() -> AsyncIterator[bytes]:
+        async with Viewer(given.camera, stretch == "1") as viewer:
+            while (frame := await viewer.next_frame()) is not None:
+                jpeg = _jpeg(frame, viewer.stretch)
+                yield b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
+                yield jpeg + b"\r\n"
+
+    return StreamingResponse(parts(), media_type=MJPEG)
+
+
+@router.websocket("/devices/camera/live")
+async def live(socket: WebSocket) -> None:
+    """Send the newest frame for every credit: 4 bytes of length, JSON numbers, JPEG.
+
+    The viewer sends `{"credits": 1, "stretch": false}`; one that is slow skips frames, none is queued.
+    """
+    await socket.accept()
+    async with Viewer(services_of(socket).camera, credits=0) as viewer:
+        listening = asyncio.create_task(_listen(socket, viewer))
+        try:
+            while (frame := await viewer.next_frame()) is not None:
+                head = _numbers(frame).encode()
+                await socket.send_bytes(len(head).to_bytes(4, "big") + head + _jpeg(frame, viewer.stretch))
+        except (WebSocketDisconnect, RuntimeError):
+            return
+        finally:
+            listening.cancel()
+
+
+async def _listen(socket: WebSocket, viewer: Viewer) -> None:
+    try:
+        while True:
+            asked = Asked.model_validate_json(await socket.receive_text())
+            viewer.ask(asked.credits, asked.stretch)
+    except (WebSocketDisconnect, RuntimeError, ValueError, KeyError):
+        viewer.close()
+
+
+def _jpeg(frame: LiveFrame, stretch: bool) -> bytes:
+    return frame.jpegs.get(stretch) or next(iter(frame.jpegs.values()))
+
+
+def _numbers(frame: LiveFrame) -> str:
+    seen = frame.statistics
+    numbers = {
+        "number": frame.number,
+        "timestamp_s": frame.timestamp_s,
+        "rows": frame.rows,
+        "cols": frame.cols,
+        "mean": seen.mean,
+        "saturated": seen.saturated,
+        "dark": seen.dark,
+        "sharpness_nd": seen.sharpness_nd,
+        "histogram": seen.histogram,
+    }
+    return json.dumps(numbers)

@@ -1,0 +1,209 @@
+"""The guided calibration of an experiment's rig: what to show, take it, retake it, how good it is."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query
+from pydantic import Field
+
+from app.api.services import Given, Services
+from app.api.wire.board import BoardGeometry
+from app.api.wire.strict import Identifier, Strict
+from app.calibrate.folder import CalibrationFolder
+from app.calibrate.guide import LivePlan, StepName
+from app.calibrate.service import GuideState
+from app.calibrate.state import state_of
+from app.errors import BadInputError
+from app.experiment.folder import Experiment
+from app.rig.conditions import Conditions
+from app.rig.stage import Task
+from calibration.board import Board
+from calibration.record import Placement
+
+router = APIRouter(tags=["calibrations"])
+StepText = Literal["camera", "projector", "wall", "response"]
+StepQuery = Annotated[StepText, Query(description="Which step of the calibration.")]
+
+
+class WantedResource(Strict):
+    """What to arrange next, in words; a board's place as parts of the picture, and which edge is nearer."""
+
+    kind: Literal["board", "place", "wall", "level", "dark", "light"]
+    text: str
+    column: float | None
+    row: float | None
+    span: float | None
+    nearer: Literal["", "left", "right", "upper", "lower"]
+    tilt_deg: float
+    roll_deg: float
+
+
+class GuideView(Strict):
+    """One view of the board; retake it by its name."""
+
+    name: str
+    points: int
+    rms_px: float | None
+    issues: list[str]
+
+
+class GuideResource(Strict):
+    """A guided calibration. While `state` is running, `done` of `total` pictures of `wanted` are taken.
+
+    `busy` is true also while another step, or another experiment's, takes pictures: none can be begun.
+    `coverage` holds rows of cells from the picture's top left; `residuals_px` holds column, row, and the
+    residual there, in pixels of a picture of `width_px` x `height_px`.
+    """
+
+    state: Literal["idle", "running", "failed"]
+    busy: bool
+    step: StepText
+    reason: str
+    wanted: WantedResource | None
+    done: int
+    total: int
+    issues: list[str]
+    complete: bool
+    views: list[GuideView]
+    width_px: int | None
+    height_px: int | None
+    coverage: list[list[bool]]
+    covered: float
+    rms_px: float | None
+    residuals_px: list[tuple[float, float, float, float]]
+    advice: list[str]
+
+
+class GuideRequest(Strict):
+    """Which step, and how; without a board, the experiment's own is used (rehearsals have one).
+
+    `anchor` is a wall point seen at u, v whose world x, z [m] were measured.
+    """
+
+    step: StepText
+    board: BoardGeometry | None = None
+    frames: int = Field(default=1, ge=1, le=1000)
+    response_frames: int = Field(default=16, ge=2, le=1000)
+    settle_s: float = Field(default=0.2, ge=0, le=60)
+    anchor: tuple[float, float, float, float] | None = None
+    plumb_px: tuple[float, float, float, float] | None = None
+    ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
+    minutes_on: float | None = Field(default=None, ge=0, le=1e6)
+
+
+@router.get("/experiments/{experiment}/calibration/guide")
+def read_guide(given: Given, experiment: Identifier, step: StepQuery = "camera") -> GuideResource:
+    """Return what is wanted next and how good the step is so far."""
+    found = given.folders.open(experiment)
+    return _resource(given, found, _plan(found, GuideRequest(step=step)))
+
+
+@router.post("/experiments/{experiment}/calibration/guide", status_code=202)
+def take_guided(given: Given, experiment: Identifier, request: GuideRequest) -> GuideResource:
+    """Take the pictures of what is wanted next; follow it by the `calibration` events, or by asking."""
+    found = given.folders.open(experiment)
+    plan = _plan(found, request)
+    given.guide.take(found, plan, Conditions(request.ambient_temperature_k, request.minutes_on))
+    return _resource(given, found, plan)
+
+
+@router.post("/experiments/{experiment}/calibration/guide/skip")
+def skip_guided(given: Given, experiment: Identifier, request: GuideRequest) -> GuideResource:
+    """Do without what is wanted now."""
+    found = given.folders.open(experiment)
+    plan = _plan(found, request)
+    given.guide.skip(found, plan)
+    return _resource(given, found, plan)
+
+
+@router.post("/experiments/{experiment}/calibration/guide/stop")
+def stop_guided(given: Given, experiment: Identifier, step: StepQuery = "camera") -> GuideResource:
+    """Stop within a frame; the pictures taken so far are kept."""
+    found = given.folders.open(experiment)
+    given.guide.stop()
+    return _resource(given, found, _plan(found, GuideRequest(step=step)))
+
+
+@router.delete("/experiments/{experiment}/calibration/views/{view}")
+def retake_view(
+    given: Given, experiment: Identifier, view: Identifier, step: StepQuery = "camera"
+) -> GuideResource:
+    """Forget a view, so that it is asked for again."""
+    found = given.folders.open(experiment)
+    plan = _plan(found, GuideRequest(step=step))
+    given.guide.retake(found, plan, view)
+    return _resource(given, found, plan)
+
+
+def _plan(experiment: Experiment, request: GuideRequest) -> LivePlan:
+    camera = experiment.settings.scene.views[0]
+    x_m, _, z_m = camera.camera.position_m
+    wall_y_m = experiment.settings.scene.room.upper_m[1]
+    place = Placement(None, x_m, z_m, wall_y_m, request.plumb_px)
+    if request.anchor is not None:
+        u, v, x_m, z_m = request.anchor
+        place = Placement((u, v), x_m, z_m, wall_y_m, request.plumb_px)
+    return LivePlan(
+        StepName(request.step),
+        camera.name,
+        _board(experiment, request),
+        request.frames,
+        request.response_frames,
+        0.0 if experiment.settings.rig.camera.kind == "simulated" else request.settle_s,
+        place,
+    )
+
+
+def _board(experiment: Experiment, request: GuideRequest) -> Board | None:
+    """The board of the request, else of the experiment."""
+    if request.board is not None:
+        return request.board.settings().board()
+    own = experiment.settings.rig.board
+    return None if own is None else own.board()
+
+
+def _resource(given: Services, experiment: Experiment, plan: LivePlan) -> GuideResource:
+    status = given.guide.status
+    own = status.experiment == experiment.folder.name and status.step == plan.step
+    running = own and status.state is GuideState.running
+    reason = status.reason if own else ""
+    try:
+        wanted = status.wanted if running else given.guide.wanted(experiment, plan)
+    except BadInputError as error:
+        wanted, reason = None, str(error)
+    state = state_of(CalibrationFolder(experiment.folder).record(plan.camera), plan.step)
+    return GuideResource(
+        state=status.state.value if own else "idle",
+        busy=status.state is GuideState.running,
+        step=plan.step.value,
+        reason=reason,
+        wanted=None if wanted is None else _wanted(wanted),
+        done=status.done if own else 0,
+        total=status.total if own else 0,
+        issues=list(status.issues) if own else [],
+        complete=state.complete,
+        views=[
+            GuideView(name=v.name, points=v.points, rms_px=v.rms_px, issues=list(v.issues))
+            for v in state.views
+        ],
+        width_px=None if state.size_px is None else state.size_px[0],
+        height_px=None if state.size_px is None else state.size_px[1],
+        coverage=[list(row) for row in state.coverage],
+        covered=state.covered,
+        rms_px=state.rms_px,
+        residuals_px=list(state.residuals_px),
+        advice=list(state.advice),
+    )
+
+
+def _wanted(task: Task) -> WantedResource:
+    view = task.view
+    return WantedResource(
+        kind=task.kind,
+        text=task.text,
+        column=None if view is None else view.column,
+        row=None if view is None else view.row,
+        span=None if view is None else view.span,
+        nearer="" if view is None else view.nearer,
+        tilt_deg=0.0 if view is None or not view.nearer else view.tilt_deg,
+        roll_deg=0.0 if view is None else view.roll_deg,
+    )

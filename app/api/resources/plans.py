@@ -1,0 +1,20 @@
+"""Plans: what an experiment would see and cost. Made by a job of kind `plan`, read here."""
+
+from fastapi import APIRouter
+
+from app.api.services import Given
+from app.api.wire.problems import ApiError
+from app.api.wire.strict import Identifier
+from app.experiment.plan import Plan
+from app.experiment.plan import read_plan as kept_plan
+
+router = APIRouter(tags=["plans"])
+
+
+@router.get("/experiments/{experiment}/plan")
+def read_plan(given: Given, experiment: Identifier) -> Plan:
+    """Return the newest plan; a job of kind `plan` makes it."""
+    found = kept_plan(given.folders.open(experiment))
+    if found is None:
+        raise ApiError("not_found", "This experiment has no plan yet.", "Submit a job of kind plan.")
+    return found

@@ -1,0 +1,126 @@
+"""The rig's projector: what it says of itself, what it may be told, and every byte of it."""
+
+import time
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query
+from pydantic import Field
+
+from app.api.services import Given
+from app.api.wire.problems import ApiError
+from app.api.wire.strict import Strict
+from app.rig.live_projector import ProjectorReport
+from app.rig.open import open_projector
+from drivers.errors import DeviceRefusedError
+from drivers.projector.protocol import Projector
+
+router = APIRouter(tags=["devices"])
+
+
+class ProjectorResource(Strict):
+    """The projector; what it does not know is null. `for_s` is how long it has been in this state."""
+
+    device: Literal["projector"] = "projector"
+    state: Literal["closed", "standby", "warming", "on", "cooling", "fault", "silent", "lost"]
+    experiment: str | None
+    name: str | None
+    source: str | None
+    muted: bool | None
+    frozen: bool | None
+    lamp_hours: int | None
+    lamp_on_s: float | None
+    for_s: float | None
+    errors: list[str]
+    capabilities: list[str]
+    reason: str
+
+
+class OpenProjector(Strict):
+    """Which rig's projector to speak to."""
+
+    experiment: str
+
+
+class ProjectorChange(Strict):
+    """What to tell it; what is left out stays. Power takes minutes: `state` says how far it is."""
+
+    power: Literal["on", "off"] | None = None
+    source: str | None = Field(default=None, min_length=1, max_length=16, pattern="^[A-Za-z0-9]+$")
+    muted: bool | None = None
+    frozen: bool | None = None
+
+
+class WireLine(Strict):
+    """One piece of traffic: > sent, < received, ! a remark; control bytes are spelled out."""
+
+    at_s: float
+    direction: str
+    text: str
+
+
+@router.get("/devices/projector")
+def read_projector(given: Given) -> ProjectorResource:
+    """Return what the projector said when it was last asked."""
+    return projector_resource(given.projector.report)
+
+
+@router.post("/devices/projector/connect")
+def connect_projector(given: Given, wanted: OpenProjector) -> ProjectorResource:
+    """Speak to the projector of an experiment's rig; connecting again opens the line anew."""
+    experiment = given.folders.open(wanted.experiment)
+    return projector_resource(given.projector.open(wanted.experiment, lambda: open_projector(experiment)))
+
+
+@router.post("/devices/projector/disconnect")
+def disconnect_projector(given: Given) -> ProjectorResource:
+    """Free the line, for another program; the lamp stays as it is."""
+    return projector_resource(given.projector.close())
+
+
+@router.patch("/devices/projector")
+def change_projector(given: Given, change: ProjectorChange) -> ProjectorResource:
+    """Switch power, source, mute or freeze; the answer holds what the projector then says."""
+    try:
+        return projector_resource(given.projector.command(lambda projector: _apply(projector, change)))
+    except DeviceRefusedError as error:
+        raise ApiError("conflict", str(error), "Then try again.") from None
+
+
+@router.get("/devices/projector/wire")
+def read_wire(given: Given, after_s: Annotated[float, Query(ge=0, le=1e12)] = 0.0) -> list[WireLine]:
+    """List the traffic after a moment (Unix time), oldest first; the latest thousand pieces are kept."""
+    return [
+        WireLine(at_s=entry.at_s, direction=entry.direction, text=entry.text)
+        for entry in given.projector.wire
+        if entry.at_s > after_s
+    ]
+
+
+def _apply(projector: Projector, change: ProjectorChange) -> None:
+    if change.power is not None:
+        projector.turn_on() if change.power == "on" else projector.turn_off()
+    if change.source is not None:
+        projector.select_source(change.source)
+    if change.muted is not None:
+        projector.mute(change.muted)
+    if change.frozen is not None:
+        projector.freeze(change.frozen)
+
+
+def projector_resource(report: ProjectorReport) -> ProjectorResource:
+    """Return what the API shows of a projector."""
+    said = report.said
+    return ProjectorResource(
+        state=report.state.value,
+        experiment=report.source,
+        name=said.name if said else None,
+        source=said.source if said else None,
+        muted=said.muted if said else None,
+        frozen=said.frozen if said else None,
+        lamp_hours=said.lamp_hours if said else None,
+        lamp_on_s=said.on_s if said else None,
+        for_s=max(0.0, time.time() - report.since_s) if report.since_s else None,
+        errors=list(said.errors) if said else [],
+        capabilities=list(report.capabilities),
+        reason=report.reason,
+    )

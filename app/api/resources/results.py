@@ -1,0 +1,296 @@
+"""Results: what came out, as numbers for the page and as files for other programs."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from fastapi import APIRouter, Query, Response
+from fastapi.responses import FileResponse
+
+from app.api.security.headers import REPORT_POLICY
+from app.api.services import Given, Services
+from app.api.wire.bodies import body
+from app.api.wire.problems import ApiError
+from app.api.wire.strict import Identifier, Strict
+from app.api.wire.volumes import Axis, Encoding, Kind, Packed, Shown, Volume, cut, pack
+from app.experiment.folder import read_manifest
+
+Form = Literal["nc", "h5", "vti", "csv", "zip", "png"]
+
+router = APIRouter(tags=["results"])
+NUMBERS = body(
+    "application/octet-stream", "Little-endian numbers in C order; value = X-Offset + X-Scale * number."
+)
+FILE = body("application/octet-stream", "A file to keep.")
+PAGE = body("text/html", "A page in one file.", text=True)
+Code = Annotated[Encoding, Query(description="u16: scaled; f16: about the middle; f32: as it is.")]
+
+
+class PresetResource(Strict):
+    """A named way to solve."""
+
+    preset: str
+    about: str
+
+
+class ResultLine(Strict):
+    """One line of the list of results. `interrupted` ones have no manifest and are never used."""
+
+    result: str
+    state: str
+    created: str | None
+    preset: str | None
+    outcome: str | None
+
+
+class FieldResource(Strict):
+    """One scalar on the result's vertices; `low` and `high` leave out a hundredth on each side."""
+
+    name: str
+    unit: str
+    label: str
+    kind: Kind
+    minimum: float
+    maximum: float
+    low: float
+    high: float
+    mean: float
+
+
+class ResultResource(Strict):
+    """A result: its grid, its fields, how it ended, and the manifest that says where it came from."""
+
+    result: str
+    x_m: list[float]
+    y_m: list[float]
+    z_m: list[float]
+    fields: list[FieldResource]
+    outcome: str
+    advice: str
+    solver_s: float
+    notes: list[str]
+    manifest: dict[str, Any]
+
+
+class ScoreResource(Strict):
+    """One figure against the truth, in words."""
+
+    name: str
+    value: float
+    unit: str
+
+
+class ReadingResource(Strict):
+    """One quantity at one point sensor: measured, with its standard deviation, and found there."""
+
+    name: str
+    unit: str
+    position_m: list[float]
+    measured: float
+    std: float
+    found: float
+
+
+class ComparisonResource(Strict):
+    """A result against what is known better; empty lists where nothing is."""
+
+    scores: list[ScoreResource]
+    readings: list[ReadingResource]
+
+
+@router.get("/experiments/{experiment}/results")
+def list_results(given: Given, experiment: Identifier) -> list[ResultLine]:
+    """List the results, newest first; interrupted ones last."""
+    done, broken = given.folders.items(experiment, "result")
+    lines = [_line(path) for path in done]
+    unfinished = [
+        ResultLine(result=path.name, state="interrupted", created=None, preset=None, outcome=None)
+        for path in broken
+    ]
+    return lines + unfinished
+
+
+@router.get("/experiments/{experiment}/results/{result}")
+def read_result(given: Given, experiment: Identifier, result: Identifier) -> ResultResource:
+    """Return one result without its numbers."""
+    folder, shown = _shown(given, experiment, result)
+    solution = shown.solution
+    return ResultResource(
+        result=result,
+        x_m=solution.x_m.tolist(),
+        y_m=solution.y_m.tolist(),
+        z_m=solution.z_m.tolist(),
+        fields=[_field(volume) for volume in shown.volumes.values()],
+        outcome=solution.outcome.name,
+        advice=solution.outcome.value,
+        solver_s=solution.solver_s,
+        notes=list(solution.notes),
+        manifest=read_manifest(folder),
+    )
+
+
+@router.get(
+    "/experiments/{experiment}/results/{result}/volumes/{field}", response_class=Response, responses=NUMBERS
+)
+def read_volume(
+    given: Given, experiment: Identifier, result: Identifier, field: Identifier, encoding: Code = "u16"
+) -> Response:
+    """Return a whole field, index order [ix, iy, iz]."""
+    _, shown = _shown(given, experiment, result)
+    return _numbers(pack(_volume(shown, field).values, encoding))
+
+
+@router.get(
+    "/experiments/{experiment}/results/{result}/slices/{field}", response_class=Response, responses=NUMBERS
+)
+def read_slice(
+    given: Given,
+    experiment: Identifier,
+    result: Identifier,
+    field: Identifier,
+    axis: Axis = "y",
+    index: Annotated[int, Query(ge=0, le=100_000)] = 0,
+    encoding: Code = "f32",
+) -> Response:
+    """Return the plane of vertices at `index` along `axis`; the two other axes in the order x, y, z."""
+    _, shown = _shown(given, experiment, result)
+    return _numbers(pack(cut(_volume(shown, field).values, axis, index), encoding))
+
+
+@router.get("/experiments/{experiment}/results/{result}/history")
+def read_history(given: Given, experiment: Identifier, result: Identifier) -> list[dict[str, float | None]]:
+    """Return what was recorded while it was solved, one object a recorded iteration."""
+    path = given.folders.item(experiment, "result", result) / "history.jsonl"
+    if not path.is_file():
+        return []
+    return [
+        _finite(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()
+    ]
+
+
+@router.get("/experiments/{experiment}/results/{result}/comparison")
+def read_comparison(given: Given, experiment: Identifier, result: Identifier) -> ComparisonResource:
+    """Return how a result compares with what is known better: a simulated room's truth, point sensors."""
+    # Imported here: the array library behind them takes a second to load.
+    from app.volume.comparison import readings, scores, truth_file
+
+    _, shown = _shown(given, experiment, result)
+    found = given.folders.open(experiment)
+    truth = truth_file(found)
+    return ComparisonResource(
+        scores=[] if truth is None else _score_lines(scores(shown.solution, truth)),
+        readings=[
+            ReadingResource(
+                name=one.name,
+                unit=one.unit,
+                position_m=list(one.position_m),
+                measured=one.measured,
+                std=one.std,
+                found=one.found,
+            )
+            for one in readings(found, shown.solution)
+        ],
+    )
+
+
+@router.get("/experiments/{experiment}/results/{result}/report", response_class=Response, responses=PAGE)
+def read_report(given: Given, experiment: Identifier, result: Identifier) -> Response:
+    """Return the one-file report; it is shown without scripts and may reach nothing."""
+    path = given.folders.item(experiment, "result", result) / "report.html"
+    if not path.is_file():
+        raise ApiError("not_found", "This result has no report yet.", "Make one: airlens report.")
+    headers = {"content-security-policy": REPORT_POLICY}
+    return FileResponse(path, media_type="text/html; charset=utf-8", headers=headers)
+
+
+@router.get(
+    "/experiments/{experiment}/results/{result}/exports/{form}", response_class=Response, responses=FILE
+)
+def read_export(given: Given, experiment: Identifier, result: Identifier, form: Form) -> Response:
+    """Return the result as a file: NetCDF, HDF5, VTK image data, CSV, an OpenFOAM case (zip), a picture."""
+    # Imported here: the writers take a second to load.
+    from app.report.export import export
+
+    folder = given.folders.item(experiment, "result", result)
+    path = export(given.folders.folder(experiment), form, result=folder)
+    return FileResponse(path, media_type="application/octet-stream", filename=f"{experiment}-{result}.{form}")
+
+
+@router.get("/presets")
+def list_presets() -> list[PresetResource]:
+    """List the ways to solve, the quickest first."""
+    from app.reconstruct.presets import PRESETS
+
+    return [PresetResource(preset=name, about=_first_line(solve)) for name, solve in PRESETS.items()]
+
+
+def _score_lines(scored: dict[str, Any]) -> list[ScoreResource]:
+    """The figures that README tells, by name; left out where a quantity was not solved for."""
+    temperature, velocity, pressure = scored["T"], scored["u"], scored["p"]
+    lines = [
+        ("T: rms error", temperature["rms_K"], "K"),
+        ("T: rms error of the still air everywhere, for comparison", temperature["trivial"]["ambient"], "K"),
+        ("T: rms error of departures from each height's mean", temperature["departure_of_departures"], "1"),
+    ]
+    if velocity is not None:
+        lines.append(("velocity: rms error over the rms of velocity", velocity["rel"], "1"))
+        lines.append(("velocity: the same in the jet", velocity["jet_rel"], "1"))
+    if pressure is not None:
+        lines.append(("p: rms error over the rms of p", pressure["rel"], "1"))
+    return [ScoreResource(name=n, value=v, unit=u) for n, v, u in lines if v is not None]
+
+
+def _first_line(solve: object) -> str:
+    return (solve.__doc__ or "").strip().split("\n")[0].split(" Raises ")[0]
+
+
+def _shown(given: Services, experiment: str, result: str) -> tuple[Path, Shown]:
+    from app.volume.comparison import truth_file
+
+    folder = given.folders.item(experiment, "result", result)
+    truth = truth_file(given.folders.open(experiment))
+    return folder, given.solutions.read(folder / "result.nc", truth)
+
+
+def _volume(shown: Shown, field: str) -> Volume:
+    if field not in shown.volumes:
+        raise ApiError("not_found", f"This result has no field {field!r}; it has {', '.join(shown.volumes)}.")
+    return shown.volumes[field]
+
+
+def _line(folder: Path) -> ResultLine:
+    manifest = read_manifest(folder)
+    texts = {key: manifest.get(key) for key in ("created", "preset", "outcome")}
+    return ResultLine(
+        result=folder.name,
+        state="finished",
+        **{key: None if value is None else str(value) for key, value in texts.items()},
+    )
+
+
+def _field(volume: Volume) -> FieldResource:
+    values = volume.values
+    low, high = np.percentile(values, (1, 99))
+    return FieldResource(
+        name=volume.name,
+        unit=volume.unit,
+        label=volume.label,
+        kind=volume.kind,
+        minimum=float(values.min()),
+        maximum=float(values.max()),
+        low=float(low),
+        high=float(high),
+        mean=float(values.mean(dtype="float64")),
+    )
+
+
+def _numbers(packed: Packed) -> Response:
+    return Response(packed.content, media_type="application/octet-stream", headers=packed.headers)
+
+
+def _finite(entry: dict[str, Any]) -> dict[str, float | None]:
+    return {
+        key: float(value) if isinstance(value, int | float) and abs(value) < 1e308 else None
+        for key, value in entry.items()
+    }

@@ -1,0 +1,62 @@
+"""Files that an operator sends: PNG, TIFF, NPY and NPZ, as the raw body of one request."""
+
+from typing import Literal
+
+from fastapi import APIRouter, Request
+
+from app.api.services import Given
+from app.api.wire.problems import ApiError
+from app.api.wire.strict import Identifier, Strict
+from app.errors import BadInputError
+
+router = APIRouter(tags=["uploads"])
+BINARY = {"schema": {"type": "string", "format": "binary"}}
+BODY = {"requestBody": {"required": True, "content": {"application/octet-stream": BINARY}}}
+
+
+class UploadedArray(Strict):
+    """One array of an upload."""
+
+    name: str
+    shape: list[int]
+    dtype: str
+    minimum: float
+    maximum: float
+    mean: float
+    nonfinite: int
+
+
+class Upload(Strict):
+    """A file that was checked, read and kept."""
+
+    upload: str
+    kind: Literal["png", "tiff", "npy", "npz"]
+    bytes: int
+    sha256: str
+    received_s: float
+    arrays: list[UploadedArray]
+
+
+@router.get("/uploads")
+def list_uploads(given: Given) -> list[Upload]:
+    """List the uploads, newest first."""
+    return [Upload.model_validate(manifest) for manifest in given.uploads.list()]
+
+
+@router.post("/uploads", status_code=201, openapi_extra=BODY)
+async def add_upload(given: Given, request: Request) -> Upload:
+    """Stream a file in, check what it declares, read it in a limited process, keep its arrays."""
+    if request.headers.get("content-type") != "application/octet-stream":
+        raise ApiError("media_type_refused", "An upload is sent as application/octet-stream.")
+    try:
+        return Upload.model_validate(await given.uploads.add(request.stream()))
+    except BadInputError as error:
+        # Nothing more of a refused file is read.
+        raise ApiError("content_refused", str(error), headers={"Connection": "close"}) from error
+
+
+@router.delete("/uploads/{upload}", status_code=204)
+def delete_upload(given: Given, upload: Identifier) -> None:
+    """Remove an upload."""
+    if not given.uploads.delete(upload):
+        raise ApiError("not_found", f"There is no upload {upload!r}.")

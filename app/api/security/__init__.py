@@ -1,0 +1,1 @@
+"""Who may ask what: token, session, headers, rates, origins."""

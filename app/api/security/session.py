@@ -1,0 +1,44 @@
+"""Exchange of the token, once, for a cookie that scripts cannot read."""
+
+from typing import Literal
+
+from fastapi import APIRouter, Response
+
+from app.api.services import Given
+from app.api.wire.strict import Strict
+
+router = APIRouter(tags=["session"])
+
+
+class Session(Strict):
+    """The browser's session."""
+
+    state: Literal["open", "closed"]
+
+
+@router.post("/session")
+def open_session(given: Given, response: Response) -> Session:
+    """Give the caller, who showed the token, a session cookie.
+
+    The page does this with the token from the address's fragment, which browsers never send.
+    """
+    config = given.config
+    response.set_cookie(
+        config.cookie_name,
+        given.access.cookie,
+        httponly=True,
+        samesite="strict",
+        secure=config.secure_cookie,
+        path="/",
+    )
+    return Session(state="open")
+
+
+@router.delete("/session")
+def close_session(given: Given, response: Response) -> Session:
+    """Forget the session in this browser."""
+    config = given.config
+    response.delete_cookie(
+        config.cookie_name, httponly=True, samesite="strict", secure=config.secure_cookie, path="/"
+    )
+    return Session(state="closed")

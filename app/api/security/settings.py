@@ -1,0 +1,97 @@
+"""What a service is configured with: where its data are, who may call it, and how much they may send."""
+
+import secrets
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.errors import BadInputError
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Upper bounds; `_per_s` are sustained rates of one client address, bursts are five seconds' worth."""
+
+    json_bytes: int = 1 << 20
+    upload_bytes: int = 512 << 20
+    unpacked_bytes: int = 1 << 30
+    image_pixels: int = 1 << 27
+    stored_uploads: int = 200
+    reads_per_s: float = 2000.0
+    writes_per_s: float = 50.0
+    failures_per_s: float = 2.0
+    parse_s: float = 30.0
+    parse_memory_bytes: int = 4 << 30
+    streams: int = 64
+
+
+def built_page() -> Path:
+    """Return where the page is: inside an installed wheel, or beside the sources."""
+    package = Path(__file__).resolve().parents[2]
+    installed = package / "page"
+    return installed if installed.is_dir() else package.parent / "web" / "dist"
+
+
+@dataclass(frozen=True)
+class ServiceConfig:
+    """A service. `hosts` and `origins` are compared whole, never by prefix or pattern."""
+
+    data_root: Path
+    token: str = field(repr=False)
+    hosts: frozenset[str]
+    origins: frozenset[str]
+    page_folder: Path = field(default_factory=built_page)
+    cookie_name: str = "airlens"
+    secure_cookie: bool = False
+    limits: Limits = Limits()
+
+    def __post_init__(self) -> None:
+        if len(self.token) < 32:
+            raise BadInputError(
+                f"The token has {len(self.token)} characters; expected at least 32 random ones. "
+                "Leave it out, and the service makes one."
+            )
+
+    @property
+    def jobs_folder(self) -> Path:
+        """The ledger and its jobs."""
+        return self.data_root / "jobs"
+
+
+def new_token() -> str:
+    """Return 43 random URL-safe characters (256 bits)."""
+    return secrets.token_urlsafe(32)
+
+
+def service_config(
+    data_root: Path,
+    token: str,
+    port: int,
+    host: str = "127.0.0.1",
+    public_url: str | None = None,
+    tls: bool = False,
+    limits: Limits = Limits(),
+) -> ServiceConfig:
+    """Return a configuration for one listening address.
+
+    On loopback all three loopback names are accepted. `public_url` names a proxy in front of the service
+    (`https://rig.example`): its host and origin are accepted too, and the cookie is then for TLS only.
+    """
+    scheme = "https" if tls else "http"
+    names = LOOPBACK if host in LOOPBACK else (host,)
+    hosts = {f"[{name}]:{port}" if ":" in name else f"{name}:{port}" for name in names}
+    origins = {f"{scheme}://{name}" for name in hosts}
+    if public_url is not None:
+        origin = public_url.rstrip("/").lower()
+        origins.add(origin)
+        hosts.add(origin.split("://", 1)[-1])
+    return ServiceConfig(
+        data_root=data_root,
+        token=token,
+        hosts=frozenset(hosts),
+        origins=frozenset(origins),
+        cookie_name=f"airlens_{port}",
+        secure_cookie=tls or (public_url or "").startswith("https://"),
+        limits=limits,
+    )

@@ -1,0 +1,1 @@
+"""What crosses the API: strict models, errors, streams, compact volumes."""

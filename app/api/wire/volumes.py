@@ -1,0 +1,151 @@
+"""Fields of a result as compact binary: the few that were read last are kept in memory."""
+
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float32
+
+from app.api.wire.problems import ApiError
+from app.volume.file import Beside
+from core.result import Solution
+
+Encoding = Literal["u16", "f16", "f32"]
+Axis = Literal["x", "y", "z"]
+Kind = Literal["found", "uncertainty", "truth", "error"]
+KEPT = 4
+
+
+@dataclass(frozen=True)
+class Packed:
+    """Little-endian numbers; the value is `offset + scale * number`."""
+
+    content: bytes
+    shape: tuple[int, ...]
+    offset: float
+    scale: float
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """What a reader needs beside the numbers."""
+        return {
+            "X-Shape": ",".join(map(str, self.shape)),
+            "X-Offset": repr(self.offset),
+            "X-Scale": repr(self.scale),
+        }
+
+
+@dataclass(frozen=True)
+class Volume:
+    """One scalar on the result's vertices, index order [ix, iy, iz]."""
+
+    name: str
+    unit: str
+    label: str
+    kind: Kind
+    values: Float32[np.ndarray, "nx ny nz"]
+
+
+def volumes_of(solution: Solution) -> dict[str, Volume]:
+    """Return every scalar of a solution by the name that it has in result.nc."""
+    found = {
+        "T": ("K", "temperature", solution.temperature_k),
+        "p": ("m2 s-2", "kinematic pressure", solution.pressure_m2_s2),
+        "T_std": ("K", "standard deviation of T", solution.temperature_std_k),
+        "p_std": ("m2 s-2", "standard deviation of p", solution.pressure_std_m2_s2),
+        "informed": ("1", "share of T's prior variance removed by measurement", solution.informed),
+    }
+    for index, axis in enumerate("xyz"):
+        for stem, words, vectors in (
+            ("", "velocity", solution.velocity_m_s),
+            ("_std", "standard deviation of velocity", solution.velocity_std_m_s),
+        ):
+            values = None if vectors is None else vectors[..., index]
+            found["uvw"[index] + stem] = ("m s-1", f"{words} along {axis}", values)
+    return {
+        name: Volume(
+            name,
+            unit,
+            label,
+            "uncertainty" if "_" in name or name == "informed" else "found",
+            np.asarray(values, np.float32),
+        )
+        for name, (unit, label, values) in found.items()
+        if values is not None
+    }
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A solution with every volume that can be looked at."""
+
+    solution: Solution
+    volumes: dict[str, Volume]
+
+
+class SolutionCache:
+    """The last few solutions; one that was written again is read again."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[tuple[Path, int], Shown] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def read(self, path: Path, truth: Path | None) -> Shown:
+        """Return the solution in `path`, beside the truth where there is one.
+
+        Raises ApiError when there is no solution, BadInputError when one of them is damaged.
+        """
+        # Imported here: xarray takes a second, and a service should answer before that.
+        from app.experiment.results import read_result
+        from app.volume.comparison import beside_truth
+
+        if not path.is_file():
+            raise ApiError("not_found", "This result has no fields.")
+        key = (path, path.stat().st_mtime_ns)
+        with self._lock:
+            if key not in self._kept:
+                solution = read_result(path)
+                known = [] if truth is None else beside_truth(solution, truth)
+                self._kept[key] = Shown(solution, volumes_of(solution) | volumes_beside(known))
+                while len(self._kept) > KEPT:
+                    self._kept.popitem(last=False)
+            self._kept.move_to_end(key)
+            return self._kept[key]
+
+
+def volumes_beside(known: list[Beside]) -> dict[str, Volume]:
+    """Return the truth and the error of every quantity."""
+    found = {}
+    for one in known:
+        truth, error = (np.asarray(values, np.float32) for values in (one.truth, one.error))
+        name = f"{one.name}_truth"
+        found[name] = Volume(name, one.unit, f"true {one.label}", "truth", truth)
+        name = f"{one.name}_error"
+        found[name] = Volume(name, one.unit, f"{one.label}, found minus true", "error", error)
+    return found
+
+
+def cut(values: Float32[np.ndarray, "nx ny nz"], axis: Axis, index: int) -> Float32[np.ndarray, "rows cols"]:
+    """Return one plane of vertices. Raises ApiError when there is none at `index`."""
+    number = "xyz".index(axis)
+    if not 0 <= index < values.shape[number]:
+        raise ApiError(
+            "invalid", f"There is no plane {index} along {axis}; expected 0 to {values.shape[number] - 1}."
+        )
+    return np.take(values, index, axis=number)
+
+
+def pack(values: Float32[np.ndarray, "*shape"], encoding: Encoding) -> Packed:
+    """Return numbers for the wire: u16 resolves 1/65535 of the range, f16 about 1/2000 of the largest."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    if encoding == "f32":
+        return Packed(values.astype("<f4").tobytes(), values.shape, 0.0, 1.0)
+    if encoding == "f16":
+        middle = (low + high) / 2
+        return Packed((values - middle).astype("<f2").tobytes(), values.shape, middle, 1.0)
+    scale = (high - low) / 65535 or 1.0
+    numbers = np.rint((np.nan_to_num(values, nan=low) - low) / scale)
+    return Packed(numbers.astype("<u2").tobytes(), values.shape, low, scale)

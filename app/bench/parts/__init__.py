@@ -1,0 +1,1 @@
+"""What several benchmarks share; the folder above holds one module a command."""

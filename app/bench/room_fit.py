@@ -1,0 +1,141 @@
+"""airlens bench room-fit: a marched room against its truth, by what is known, entered wrongly, and measured.
+
+Shifts come from `synthetic_problem`. A camera of a quarter of the width and 256 times the frames carries
+the default rig's information in as many windows, at a sixteenth of the rendering.
+"""
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import typer
+
+from app.volume.file import RoomVolume, read_volume
+from app.volume.measurement import synthetic_problem
+from app.volume.scene import RIG_PLACES, Information, RigName, RigOptions
+from app.volume.score import score_solution, values_at
+from core.metrics import inner
+from core.problem import Problem
+from core.result import Solution
+from core.scene import FlowModel, Inlet, Scene
+from core.solve.room import RoomSettings, solve_room
+
+_CAMERA_PX, _WINDOW_PX, _FRAMES = (1024, 768), 8, 100 * 16 * 16
+_SIGMAS = 1.96
+
+
+def register(bench: typer.Typer) -> None:
+    """Add the command."""
+
+    @bench.command("room-fit")
+    def room_fit(
+        truth: Annotated[list[Path], typer.Option(help="Room volume (NPZ); may be given several times.")],
+        information: Annotated[Literal["paper", "operator", "surveyed"], typer.Option()] = "surveyed",
+        light: Annotated[Literal["texture", "projector"], typer.Option()] = "texture",
+        rig: Annotated[Literal["paper", "lab"], typer.Option()] = "paper",
+        wrong: Annotated[float, typer.Option(help="Multiplies the supply's excess and velocity.")] = 1.0,
+        wall_heat: Annotated[
+            float,
+            typer.Option(help="Multiplies the walls' heat coefficient as it follows from what is entered."),
+        ] = 1.0,
+        closure: Annotated[
+            Literal["auto", "given", "zero_equation"], typer.Option(help="given: constant viscosity.")
+        ] = "auto",
+        images: Annotated[bool, typer.Option(help="Whether the images correct anything.")] = True,
+        cells: Annotated[int, typer.Option(help="Cells of the fine room.")] = 48,
+        seeds: Annotated[int, typer.Option(help="Noise seeds 0 to this one, exclusive.")] = 1,
+        as_json: Annotated[bool, typer.Option("--json")] = False,
+    ) -> None:
+        """Errors of T, u and p, and the share of points within their 95 % intervals."""
+        settings = RoomSettings(cells=cells, use_images=images, wall_heat=wall_heat)
+        for path in truth:
+            for seed in range(seeds):
+                problem, volume = problem_of(path, information, light, rig, seed)
+                problem = entered(problem, wrong, closure)
+                row = {
+                    "truth": path.stem,
+                    "information": information,
+                    "light": light,
+                    "rig": rig,
+                    "seed": seed,
+                }
+                row |= {"wrong": wrong, "wall_heat": wall_heat, "closure": closure, "images": images}
+                row |= {"cells": cells} | fit_row(problem, volume, settings)
+                typer.echo(json.dumps(row) if as_json else _sentence(row))
+
+
+def problem_of(
+    path: Path, information: Information, light: Literal["texture", "projector"], rig: RigName, seed: int
+) -> tuple[Problem, RoomVolume]:
+    """The problem that the default rig's noise makes of a volume."""
+    volume = read_volume(path)
+    stand_off_m, baseline_m = RIG_PLACES[rig]
+    options = RigOptions(
+        camera_px=_CAMERA_PX, frames=_FRAMES, light=light, stand_off_m=stand_off_m, baseline_m=baseline_m
+    )
+    return synthetic_problem(volume, options, information, window_px=_WINDOW_PX, seed=seed), volume
+
+
+def entered(problem: Problem, wrong: float, closure: str) -> Problem:
+    """The problem with its supply entered `wrong` times too strong and warm, and another closure."""
+    scene = problem.scene
+    ambient = scene.air.ambient_temperature_k
+
+    def mistaken(inlet: Inlet) -> Inlet:
+        x, y, z = (wrong * v for v in inlet.velocity_m_s)
+        temperature_k = ambient + wrong * (inlet.temperature_k - ambient)
+        return replace(inlet, temperature_k=temperature_k, velocity_m_s=(x, y, z))
+
+    boundary = tuple(mistaken(b) if isinstance(b, Inlet) else b for b in scene.boundary)
+    flow = scene.flow if closure == "auto" else FlowModel(transport=closure)  # type: ignore[arg-type]
+    changed: Scene = replace(scene, boundary=boundary, flow=flow)
+    return Problem(changed, problem.shifts, problem.planes, problem.sensors)
+
+
+def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dict[str, Any]:
+    """Solve; errors, coverage, processor seconds, and what was said."""
+    told: list[dict[str, float]] = []
+    began_s = time.process_time()
+    solution = solve_room(problem, settings, on_event=told.append)
+    cpu_s = time.process_time() - began_s
+    scores = score_solution(solution, volume)
+    return {
+        "u_rel": scores["u"]["rel"],
+        "T_rms_k": scores["T"]["rms_K"],
+        "T_departure": scores["T"]["departure_of_departures"],
+        "p_departure": scores["p"]["rel_departure"],
+        **coverage(solution, volume),
+        **{name: value for event in told for name, value in event.items() if name.startswith("supply_")},
+        "cpu_s": cpu_s,
+        "wall_s": solution.solver_s,
+        "outcome": solution.outcome.name,
+        "notes": list(solution.notes),
+    }
+
+
+def coverage(solution: Solution, volume: RoomVolume) -> dict[str, float]:
+    """Share of the points whose truth lies within 1.96 standard deviations; p about its mean."""
+
+    def within(found: Any, std: Any, truth: np.ndarray, *, level: bool = True) -> float:
+        error = inner(values_at(volume, solution, found)) - inner(truth)
+        error = error if level else error - error.mean()
+        return float(np.mean(np.abs(error) <= _SIGMAS * inner(values_at(volume, solution, std))))
+
+    s = solution
+    return {
+        "T_within": within(s.temperature_k, s.temperature_std_k, volume.temperature_k),
+        "u_within": within(s.velocity_m_s, s.velocity_std_m_s, volume.velocity_m_s),
+        "p_within": within(s.pressure_m2_s2, s.pressure_std_m2_s2, volume.pressure_m2_s2, level=False),
+    }
+
+
+def _sentence(row: dict[str, Any]) -> str:
+    return (
+        f"{row['truth']} {row['information']} seed {row['seed']}: u {row['u_rel']:.3f}, T {row['T_rms_k']:.3f} K, "
+        f"departure of T {row['T_departure']:.3f}, of p {row['p_departure']:.3f}; within 95 %: "
+        f"T {row['T_within']:.3f}, u {row['u_within']:.3f}, p {row['p_within']:.3f}; {row['cpu_s']:.0f} CPU s, "
+        f"{row['wall_s']:.0f} s ({row['outcome']})\n  " + "\n  ".join(row["notes"])
+    )

@@ -1,0 +1,1 @@
+"""Calibration of a rig step by step, by guided pictures or from files."""

@@ -1,0 +1,126 @@
+"""Takes the pictures of a calibration and keeps each as soon as it is taken, in the layout that `--images` reads.
+
+calibration/live-camera/view_00.png
+calibration/live-projector/place_00/graycode_00.png
+calibration/live-wall/graycode_00.png, live-level/level.png
+calibration/live-response/dark/00.png, grey_128/00.png, exposure_0.02/00.png
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import tifffile
+
+from app.errors import AirlensError
+from app.files.disk_space import check_room
+from app.files.durable import write_durably
+from app.rig.stage import Stage
+from calibration.graycode import patterns
+from drivers.burst import BurstOutcome, CapturePlan
+from drivers.capture import Abort, Taken, run_capture
+from drivers.display import Picture
+from drivers.protocols import Frame
+
+OnPicture = Callable[[int, int], object]
+
+
+class StoppedError(AirlensError):
+    """The operator stopped; what was taken before is kept."""
+
+
+class Shooter:
+    """One stage's camera and screen; `progress(done, total)` hears of every picture."""
+
+    def __init__(
+        self, stage: Stage, frames: int, settle_s: float, progress: OnPicture, abort: Abort | None = None
+    ) -> None:
+        self._stage, self._frames, self._settle_s = stage, frames, settle_s
+        self._progress, self._abort = progress, abort
+
+    def one(self, file: Path) -> Path:
+        """Take one picture (the mean of `frames`) and return where it was kept. Raises StoppedError, DeviceError."""
+        newest: list[Frame] = []
+        plan = CapturePlan(kind="flat", frames=self._frames, settle_s=self._settle_s)
+        check_room(_existing(file), plan, self._stage.camera.info)
+        burst = run_capture(
+            self._stage.camera, plan, on_frame=lambda taken: newest.append(taken.frame), abort=self._abort
+        )
+        _check(burst.outcome, file)
+        if len(newest) == 1:
+            return save(file, newest[0].pixels)
+        return save(file.with_suffix(".tif"), burst.mean * np.float32(burst.full_scale_counts))
+
+    def gray_code(self, folder: Path) -> None:
+        """Show every Gray-code pattern and take a picture of each; the screen must keep showing it."""
+        shown = patterns(*self._panel_px())
+        for number, pattern in enumerate(shown):
+            self._show(pattern)
+            self.one(folder / f"graycode_{number:02d}.png")
+            self._progress(number + 1, len(shown))
+
+    def burst(self, folder: Path, frames: int, *, dark: bool = False) -> float:
+        """Keep every frame of a burst, for its noise; return their mean level, a part of full scale."""
+        plan = CapturePlan(kind="dark" if dark else "flat", frames=frames, settle_s=self._settle_s)
+
+        def keep(taken: Taken) -> None:
+            save(folder / f"{taken.moments.frames - 1:02d}.png", taken.frame.pixels)
+            self._progress(taken.moments.frames, frames)
+
+        burst = run_capture(self._stage.camera, plan, on_frame=keep, abort=self._abort)
+        _check(burst.outcome, folder)
+        return float(burst.mean.mean())
+
+    def light(self, level: int = 255) -> None:
+        """Light everything evenly, where there is a projector."""
+        if self._stage.display is not None:
+            width_px, height_px = self._panel_px()
+            self._show(np.full((height_px, width_px), level, np.uint8))
+
+    def _show(self, picture: Picture) -> None:
+        display = self._stage.display
+        if display is None:
+            raise AirlensError(
+                "This rig has no screen to show patterns with. Open the projector's page first."
+            )
+        if not display.is_showing(display.show(picture)):
+            raise AirlensError(
+                "The projector's page no longer shows the pattern. Put it back, and try again."
+            )
+
+    def _panel_px(self) -> tuple[int, int]:
+        if self._stage.panel_px is None:
+            raise AirlensError(
+                "The projector's size is not known; give its native pixels, such as --projector-px 1024x768."
+            )
+        return self._stage.panel_px
+
+
+def save(file: Path, pixels: np.ndarray) -> Path:
+    """Write a picture durably: PNG as the camera gave it, means as TIFF."""
+
+    def write(temporary: Path) -> None:
+        if file.suffix == ".png":
+            cv2.imwrite(str(temporary), pixels, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        else:
+            tifffile.imwrite(temporary, pixels)
+
+    write_durably(file, write)
+    return file
+
+
+def _check(outcome: BurstOutcome, where: Path) -> None:
+    if outcome is BurstOutcome.ABORTED:
+        raise StoppedError(
+            "Stopped. The pictures taken so far are kept; the same command goes on from there."
+        )
+    if outcome is not BurstOutcome.COMPLETE:
+        raise AirlensError(
+            f"The camera ended the burst early ({outcome.value}) at {where.name}. Check it, then run the same "
+            "command again; the pictures before it are kept."
+        )
+
+
+def _existing(file: Path) -> Path:
+    return next(p for p in file.parents if p.exists())

@@ -1,0 +1,1 @@
+"""Taking a burst of frames into an experiment, and judging it."""

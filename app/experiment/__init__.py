@@ -1,0 +1,1 @@
+"""The experiment folder: its settings, captures, results and plan."""

@@ -1,0 +1,162 @@
+"""A capture is a folder: images, metadata, and a manifest that is written last.
+
+    captures/<id>/
+        reference.tif       mean and standard deviation (flow.tif, dark.tif, flat.tif by its role)
+        frames.tif          optional raw stack
+        manifest.json       last: what was asked, what was granted, every frame, every verdict
+        incomplete.json     only while the burst runs, or after it was cut short
+        partial.tif         the moments so far, renewed every few seconds
+
+A folder without a manifest is an interrupted capture: what it holds can be read, and is never a measurement.
+"""
+
+import os
+import shutil
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from app.errors import BadInputError
+from app.experiment.capture_files import BurstImage, RawStack, read_image, write_image
+from app.experiment.folder import read_manifest, write_manifest
+from app.files.durable import make_folder, sync, write_json
+from app.files.provenance import sha256
+from app.files.toml import to_plain
+from drivers.burst import Burst, BurstOutcome, CapturePlan
+from drivers.capture import Taken
+
+CHECKPOINT_S = 5.0
+
+
+@dataclass(frozen=True)
+class Capture:
+    """A capture as read back. `images` holds one image a view; `manifest` is empty for an interrupted one."""
+
+    folder: Path
+    role: str
+    complete: bool
+    images: tuple[BurstImage, ...]
+    manifest: Mapping[str, Any]
+
+
+def write_capture(
+    folder: Path,
+    burst: Burst | Sequence[Burst],
+    *,
+    role: str | None = None,
+    origin: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write one burst (or one a view) as a finished capture and return the folder.
+
+    `role` is the plan's kind unless given; `origin` (hashes, seed, ...) goes into the manifest as it is.
+    """
+    bursts = [burst] if isinstance(burst, Burst) else list(burst)
+    role = role or bursts[0].plan.kind
+    views = []
+    for number, one in enumerate(bursts):
+        path = folder / image_name(role, number)
+        write_image(path, BurstImage(one.mean, one.std, one.frames))
+        views.append({"file": path.name, "sha256": sha256(path)} | describe_burst(one))
+    raw = folder / "frames.tif"
+    write_manifest(
+        folder,
+        {
+            "schema_version": 1,
+            "role": role,
+            "complete": all(one.outcome is BurstOutcome.COMPLETE for one in bursts),
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "views": views,
+            "raw": {"file": raw.name, "sha256": sha256(raw)} if raw.exists() else None,
+            "origin": dict(origin or {}),
+        },
+    )
+    for leftover in ("incomplete.json", "partial.tif"):
+        (folder / leftover).unlink(missing_ok=True)
+    return folder
+
+
+def image_name(role: str, view: int = 0) -> str:
+    """File name of a view's image."""
+    return f"{role}.tif" if view == 0 else f"{role}-{view}.tif"
+
+
+def describe_burst(burst: Burst) -> dict[str, Any]:
+    """Return everything but the images as plain data."""
+    names = ("plan", "outcome", "camera", "full_scale_counts", "settings", "refused", "verdicts", "records")
+    return {"frames": burst.frames} | {name: _plain(getattr(burst, name)) for name in names}
+
+
+def load_capture(folder: Path) -> Capture:
+    """Read a capture, finished or interrupted. Raises BadInputError when there is nothing to read."""
+    if (folder / "manifest.json").exists():
+        manifest = read_manifest(folder)
+        images = tuple(read_image(folder / view["file"]) for view in manifest["views"])
+        return Capture(folder, manifest["role"], manifest["complete"], images, manifest)
+    partial = folder / "partial.tif"
+    if not partial.exists():
+        raise BadInputError(
+            f"{folder} holds no capture: it has no manifest.json and no partial.tif. "
+            "The burst was interrupted before its first frames; take it again."
+        )
+    return Capture(folder, "interrupted", False, (read_image(partial),), {})
+
+
+class CaptureRecorder:
+    """Follows a burst while it runs, so that a crash leaves what was taken before, marked as incomplete.
+
+    Hand `observe` to `run_capture` as `on_frame`; then call `keep` or `discard`.
+    """
+
+    def __init__(self, folder: Path, plan: CapturePlan, checkpoint_s: float = CHECKPOINT_S) -> None:
+        make_folder(folder.parent)
+        folder.mkdir()
+        sync(folder.parent)
+        started = datetime.now(UTC).isoformat(timespec="seconds")
+        about = {"role": plan.kind, "plan": to_plain(plan), "started": started, "process": os.getpid()}
+        write_json(folder / "incomplete.json", about)
+        self.folder, self._checkpoint_s = folder, checkpoint_s
+        self._saved_s = float("-inf")
+        self._stack = RawStack(folder / "frames.tif") if plan.raw_stack else None
+
+    def observe(self, taken: Taken) -> None:
+        """Append to the raw stack; renew the moments when their time has come."""
+        if self._stack:
+            self._stack.add(taken.frame, taken.record)
+        began_s = time.monotonic()
+        if began_s - self._saved_s < self._checkpoint_s:
+            return
+        full_scale = taken.frame.full_scale_counts
+        moments = taken.moments
+        image = BurstImage(moments.mean(full_scale), moments.std(full_scale), moments.frames)
+        write_image(self.folder / "partial.tif", image)
+        # A slow disk must not slow the burst down: at most a tenth of the time goes into checkpoints.
+        self._saved_s = time.monotonic()
+        self._checkpoint_s = max(self._checkpoint_s, 10 * (self._saved_s - began_s))
+
+    def keep(self, burst: Burst, origin: Mapping[str, Any] | None = None) -> Path:
+        """Finish the folder. What the device cut short gets no manifest: it is never a measurement."""
+        self._close()
+        if burst.outcome in (BurstOutcome.COMPLETE, BurstOutcome.ABORTED):
+            return write_capture(self.folder, burst, origin=origin)
+        write_image(self.folder / "partial.tif", BurstImage(burst.mean, burst.std, burst.frames))
+        write_json(self.folder / "incomplete.json", {"role": burst.plan.kind} | describe_burst(burst))
+        return self.folder
+
+    def discard(self) -> None:
+        """Remove the folder and what was taken."""
+        self._close()
+        shutil.rmtree(self.folder)
+
+    def _close(self) -> None:
+        if self._stack:
+            self._stack.close()
+            self._stack = None
+
+
+def _plain(value: Any) -> Any:
+    return TypeAdapter(Any).dump_python(value, mode="json")

@@ -1,0 +1,149 @@
+"""An experiment is a folder (layout below); this is the only module that knows where things are in it.
+
+    experiment.toml            rig and scene
+    calibration/bundle.json    models, with units, date, quality
+    captures/<id>/             manifest.json (written last), reference.tif or flow.tif
+    results/<id>/              result.nc, report.html, manifest.json (written last)
+    truth.npz                  simulated experiments only: the room that the twin looks at
+
+A folder without a manifest is an interrupted one: listed as such, never used as a result.
+"""
+
+import json
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from app.errors import BadInputError
+from app.experiment.rig_settings import RigSettings
+from app.files.durable import write_json, write_text
+from app.files.toml import Strict, read_toml, to_toml
+from core.scene import Scene
+
+
+class ExperimentSettings(Strict):
+    """The content of experiment.toml."""
+
+    schema_version: Literal[1] = 1
+    title: str = ""
+    information: str = ""
+    rig: RigSettings = RigSettings()
+    scene: Scene
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An experiment folder and its settings."""
+
+    folder: Path
+    settings: ExperimentSettings
+
+    @property
+    def bundle_path(self) -> Path:
+        """The calibration's models."""
+        return self.folder / "calibration" / "bundle.json"
+
+    @property
+    def captures_folder(self) -> Path:
+        """One folder a capture."""
+        return self.folder / "captures"
+
+    @property
+    def results_folder(self) -> Path:
+        """One folder a result."""
+        return self.folder / "results"
+
+    def file(self, name: str) -> Path:
+        """A file that the settings name, inside the folder. Raises BadInputError for a path outside it."""
+        path = (self.folder / name).resolve()
+        if not path.is_relative_to(self.folder.resolve()):
+            raise BadInputError(
+                f"{name!r} points outside the experiment {self.folder}; give a file inside it."
+            )
+        if not path.is_file():
+            raise BadInputError(
+                f"The experiment names {name!r}, but {path} does not exist. Put the file there."
+            )
+        return path
+
+    def captures(self, role: str | None = None) -> list[Path]:
+        """Finished captures of a role ('reference', 'flow'), oldest first."""
+        folders = finished(self.captures_folder)
+        return [f for f in folders if role is None or read_manifest(f).get("role") == role]
+
+    def latest_capture(self, role: str) -> Path:
+        """The newest finished capture of a role. Raises BadInputError when there is none."""
+        found = self.captures(role)
+        if not found:
+            raise BadInputError(
+                f"{self.folder} has no finished {role} capture. "
+                f"Take one: airlens capture {role} {self.folder}"
+            )
+        return found[-1]
+
+    def latest_result(self) -> Path:
+        """The newest finished result. Raises BadInputError when there is none."""
+        found = finished(self.results_folder)
+        if not found:
+            raise BadInputError(
+                f"{self.folder} has no finished result. Make one: airlens reconstruct {self.folder}"
+            )
+        return found[-1]
+
+
+def open_experiment(folder: Path) -> Experiment:
+    """Read an experiment folder. Raises BadInputError."""
+    return Experiment(folder, read_toml(folder / "experiment.toml", ExperimentSettings))
+
+
+def create_experiment(folder: Path, settings: ExperimentSettings) -> Experiment:
+    """Make a new experiment folder. Raises BadInputError when there already is one."""
+    if (folder / "experiment.toml").exists():
+        raise BadInputError(
+            f"{folder} already holds an experiment; give another folder, or remove this one first."
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    return save_settings(folder, settings)
+
+
+def save_settings(folder: Path, settings: ExperimentSettings) -> Experiment:
+    """Write experiment.toml durably."""
+    write_text(folder / "experiment.toml", to_toml(settings))
+    return Experiment(folder, settings)
+
+
+def new_id(parent: Path, stem: str) -> str:
+    """A fresh, sortable folder name: time, then what it is."""
+    moment = datetime.now(UTC).strftime("%Y%m%dT%H%M%S")
+    candidate, number = f"{moment}-{stem}", 1
+    while (parent / candidate).exists():
+        number += 1
+        candidate = f"{moment}-{number:02d}-{stem}"
+    return candidate
+
+
+def finished(parent: Path) -> list[Path]:
+    """Folders below `parent` that hold a manifest, oldest first."""
+    return sorted(path.parent for path in parent.glob("[!.]*/manifest.json"))
+
+
+def interrupted(parent: Path) -> list[Path]:
+    """Folders below `parent` without a manifest: never results."""
+    return sorted(p for p in parent.glob("*/") if not (p / "manifest.json").exists())
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The manifest of a finished capture or result. Raises BadInputError when it is not JSON."""
+    path = folder / "manifest.json"
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise BadInputError(
+            f"{path} cannot be read ({error}); remove the folder, or restore it from a copy."
+        ) from None
+
+
+def write_manifest(folder: Path, content: dict[str, Any]) -> None:
+    """Mark a folder as finished: written last, durably."""
+    write_json(folder / "manifest.json", content)

@@ -1,0 +1,94 @@
+"""The plan of an experiment as it is kept, shown and sent: numbers and sentences, no computation."""
+
+import json
+
+from app.experiment.folder import Experiment
+from app.files.toml import Strict, parse
+
+PLAN_FILE = "plan.json"
+
+
+class MapLine(Strict):
+    """Length of the expected shift over the picture: rows of px / 1000 at window centres [px]."""
+
+    columns_px: list[float]
+    rows_px: list[float]
+    shift_mpx: list[list[float | None]]
+
+
+class ViewLine(Strict):
+    """What one view would see. `frames_needed`: for the expected flow to stand out in one window."""
+
+    name: str
+    light: str
+    window_px: int
+    noise_px: float | None
+    shift_median_px: float
+    shift_p90_px: float
+    shift_p99_px: float
+    signal_to_noise: float
+    picture_signal_to_noise: float
+    smallest_visible_k: float | None
+    frames: int
+    frames_needed: float | None
+    other_light: str
+    other_light_shift_p99_px: float
+    map: MapLine
+
+
+class ChoiceLine(Strict):
+    """One resolved `auto`: what it is held against, and its cost as a share of the dearest choice."""
+
+    name: str
+    value: bool | int | str
+    bound: float
+    limit: float
+    unit: str
+    cost_share: float
+    reason: str
+
+
+class SeenLine(Strict):
+    """Shares of an unknown temperature's variance that are found."""
+
+    modes: int
+    modes_seen: int
+    images: float
+    boundary: float
+    both: float
+
+
+class PresetLine(Strict):
+    """What a preset would cost and find; null where nothing predicts it. `fits` is false where it would refuse."""
+
+    preset: str
+    fits: bool
+    solver_s: float | None
+    memory_mb: float | None
+    temperature_error_k: float | None
+    velocity_error: float | None
+    pressure_error: float | None
+    reason: str
+
+
+class Plan(Strict):
+    """Everything that can be said beforehand."""
+
+    schema_version: int = 1
+    expected: str
+    expected_contrast_k: float
+    expected_departure_k: float
+    views: list[ViewLine]
+    seen: SeenLine
+    choices: list[ChoiceLine]
+    presets: list[PresetLine]
+    machine: str
+    verdicts: list[str]
+
+
+def read_plan(experiment: Experiment) -> Plan | None:
+    """The plan that was kept, or None. Raises BadInputError for a file that is none."""
+    path = experiment.folder / PLAN_FILE
+    if not path.is_file():
+        return None
+    return parse(json.loads(path.read_text(encoding="utf-8")), Plan, str(path))

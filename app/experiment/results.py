@@ -1,0 +1,96 @@
+"""Results on disk: result.nc (NetCDF, CF names and units) and its way back into a `Solution`."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from app.errors import BadInputError
+from app.files.durable import durable_path
+from core.result import Outcome, Solution
+
+_DIMS = ("x", "y", "z")
+
+# Solution field -> (variable, units, CF standard name or '', long name)
+_VOLUMES = {
+    "temperature_k": ("T", "K", "air_temperature", "temperature"),
+    "pressure_m2_s2": ("p", "m2 s-2", "", "kinematic pressure perturbation"),
+    "temperature_std_k": ("T_std", "K", "", "standard deviation of the temperature"),
+    "pressure_std_m2_s2": ("p_std", "m2 s-2", "", "standard deviation of the kinematic pressure"),
+    "informed": ("informed", "1", "", "share of the prior variance of T that the measurements removed"),
+}
+_VECTORS = {
+    "velocity_m_s": ("u", "velocity"),
+    "velocity_std_m_s": ("u_std", "standard deviation of the velocity"),
+}
+
+
+def to_dataset(solution: Solution, attributes: dict[str, str]) -> xr.Dataset:
+    """The solution as a CF dataset: coordinates x, y, z [m]; T [K], p [m2 s-2], u, v, w [m s-1]."""
+    coordinates = {
+        axis: (
+            axis,
+            np.asarray(getattr(solution, f"{axis}_m"), np.float64),
+            {"units": "m", "axis": axis.upper()},
+        )
+        for axis in _DIMS
+    }
+    variables = {}
+    for name, (variable, units, standard, long) in _VOLUMES.items():
+        values = getattr(solution, name)
+        if values is not None:
+            names = {"units": units, "long_name": long} | ({"standard_name": standard} if standard else {})
+            variables[variable] = (_DIMS, np.asarray(values, np.float32), names)
+    for name, (stem, long) in _VECTORS.items():
+        values = getattr(solution, name)
+        if values is not None:
+            for i, axis in enumerate(_DIMS):
+                names = {"units": "m s-1", "long_name": f"{long} along {axis}"}
+                variables[_component(stem, i)] = (_DIMS, np.asarray(values[..., i], np.float32), names)
+    notes = {
+        "Conventions": "CF-1.11",
+        "outcome": solution.outcome.name,
+        "solver_s": solution.solver_s,
+        "notes": "\n".join(solution.notes),
+    }
+    return xr.Dataset(variables, coordinates, notes | attributes)
+
+
+def write_result(path: Path, solution: Solution, attributes: dict[str, str]) -> None:
+    """Write result.nc durably."""
+    dataset = to_dataset(solution, attributes)
+    encoding = {name: {"zlib": True, "complevel": 4} for name in dataset.data_vars}
+    with durable_path(path) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+
+
+def read_result(path: Path) -> Solution:
+    """Read result.nc. Raises BadInputError for a file that is not one."""
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+            data = dataset.load()
+        fields: dict[str, Any] = {
+            name: data[entry[0]].to_numpy() if entry[0] in data else None for name, entry in _VOLUMES.items()
+        }
+        for name, (stem, _) in _VECTORS.items():
+            parts = [_component(stem, i) for i in range(3)]
+            fields[name] = np.stack([data[p].to_numpy() for p in parts], -1) if parts[0] in data else None
+        return Solution(
+            x_m=data["x"].to_numpy(),
+            y_m=data["y"].to_numpy(),
+            z_m=data["z"].to_numpy(),
+            outcome=Outcome[str(data.attrs["outcome"])],
+            solver_s=float(data.attrs["solver_s"]),
+            notes=tuple(str(data.attrs["notes"]).splitlines()),
+            **fields,
+        )
+    except (OSError, KeyError, ValueError) as error:
+        raise BadInputError(
+            f"{path} is not a readable result ({error}). Reconstruct again, or give a result.nc."
+        ) from None
+
+
+def _component(stem: str, index: int) -> str:
+    """u, v, w and u_std, v_std, w_std."""
+    return "uvw"[index] + stem[1:]

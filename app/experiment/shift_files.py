@@ -1,0 +1,58 @@
+"""The measured shifts of a result on disk: shift-<view>.nc, for the report, the page, and other programs."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from app.errors import BadInputError
+from app.files.durable import durable_path
+from core.problem import ShiftMeasurement
+
+
+def write_shifts(folder: Path, shifts: tuple[ShiftMeasurement, ...]) -> None:
+    """Write one NetCDF a view: centres, displacement, information."""
+    for index, shift in enumerate(shifts):
+        pixel, component = {"units": "pixel"}, ("window", "component")
+        dataset = xr.Dataset(
+            {
+                "centre": (component, shift.centres_px, pixel | {"long_name": "window centre"}),
+                "displacement": (
+                    component,
+                    shift.displacement_px,
+                    pixel | {"long_name": "displacement of the pattern, to the right and down"},
+                ),
+                "information": (
+                    ("window", "component", "other"),
+                    shift.information_per_px2,
+                    {"units": "pixel-2", "long_name": "inverse covariance of the displacement"},
+                ),
+            },
+            attrs={"Conventions": "CF-1.11", "window_px": shift.window_px},
+        )
+        with durable_path(folder / f"shift-{index}.nc") as temporary:
+            dataset.to_netcdf(temporary, engine="h5netcdf")
+
+
+def read_shifts(folder: Path) -> tuple[ShiftMeasurement, ...]:
+    """Read what `write_shifts` wrote. Raises BadInputError."""
+    shifts = []
+    for path in sorted(folder.glob("shift-*.nc")):
+        try:
+            with xr.open_dataset(path, engine="h5netcdf") as dataset:
+                data = dataset.load()
+            shifts.append(
+                ShiftMeasurement(
+                    centres_px=data["centre"].to_numpy(),
+                    displacement_px=data["displacement"].to_numpy(),
+                    information_per_px2=data["information"].to_numpy(),
+                    window_px=int(np.asarray(data.attrs["window_px"])),
+                )
+            )
+        except (OSError, KeyError, ValueError) as error:
+            raise BadInputError(
+                f"{path} is not a readable shift file ({error}); reconstruct again."
+            ) from None
+    if not shifts:
+        raise BadInputError(f"{folder} holds no measured shifts; reconstruct again.")
+    return tuple(shifts)

@@ -1,0 +1,145 @@
+"""Keeps uploads: streamed to a hidden file, checked by headers, read by a child, published by rename."""
+
+import asyncio
+import hashlib
+import json
+import os
+import secrets
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from app.errors import BadInputError
+from app.files.durable import write_json
+from app.files.uploads.declared import HEAD_BYTES, Kind, check_head, declared_arrays
+
+MANIFEST = "manifest.json"
+
+
+@dataclass(frozen=True)
+class UploadLimits:
+    """What one upload may hold, and what reading it may take."""
+
+    pixels: int
+    unpacked_bytes: int
+    parse_s: float
+    parse_memory_bytes: int
+    stored: int
+
+
+class UploadStore:
+    """Uploads in one folder, each a folder with `manifest.json` (written last) and one NPY an array."""
+
+    def __init__(self, folder: Path, limits: UploadLimits) -> None:
+        self._folder = folder
+        self._limits = limits
+        self._children = asyncio.Semaphore(2)
+        folder.mkdir(parents=True, exist_ok=True)
+        for left in folder.glob(".*"):
+            shutil.rmtree(left, ignore_errors=True)
+
+    async def add(self, chunks: AsyncIterator[bytes]) -> dict[str, Any]:
+        """Return the manifest of a new upload; BadInputError, with nothing kept, if it cannot be used."""
+        if len(self.list()) >= self._limits.stored:
+            raise BadInputError(
+                f"There are {self._limits.stored} uploads already. Delete some that are no longer needed."
+            )
+        name = f"u{secrets.token_hex(8)}"
+        hidden = self._folder / f".{name}"
+        hidden.mkdir()
+        try:
+            manifest = {"upload": name, **await self._read(hidden, chunks)}
+            await asyncio.to_thread(_publish, hidden, self._folder / name, manifest)
+        finally:
+            shutil.rmtree(hidden, ignore_errors=True)
+        return manifest
+
+    def list(self) -> list[dict[str, Any]]:
+        """Return the manifests, newest first; what has none is unfinished and not shown."""
+        manifests = [json.loads(path.read_text()) for path in self._folder.glob(f"u*/{MANIFEST}")]
+        return sorted(manifests, key=lambda m: (m["received_s"], m["upload"]), reverse=True)
+
+    def folder(self, upload: str) -> Path | None:
+        """Return the folder of `upload` by listing, so that no path is made from what was asked."""
+        return next(
+            (path.parent for path in self._folder.glob(f"u*/{MANIFEST}") if path.parent.name == upload), None
+        )
+
+    def delete(self, upload: str) -> bool:
+        """Remove an upload; False if there is none."""
+        folder = self.folder(upload)
+        if folder is not None:
+            (folder / MANIFEST).unlink()
+            shutil.rmtree(folder)
+        return folder is not None
+
+    async def _read(self, hidden: Path, chunks: AsyncIterator[bytes]) -> dict[str, Any]:
+        original = hidden / "original"
+        kind, size_bytes, digest = await self._receive(original, chunks)
+        limits = self._limits
+        await asyncio.to_thread(declared_arrays, original, kind, limits.pixels, limits.unpacked_bytes)
+        async with self._children:
+            arrays = await asyncio.to_thread(read_in_child, kind, original, hidden, limits)
+        original.unlink()
+        return {
+            "kind": kind,
+            "bytes": size_bytes,
+            "sha256": digest,
+            "received_s": round(time.time(), 3),
+            "arrays": arrays,
+        }
+
+    async def _receive(self, path: Path, chunks: AsyncIterator[bytes]) -> tuple[Kind, int, str]:
+        digest = hashlib.sha256()
+        head, kind, size_bytes = b"", None, 0
+        with path.open("xb") as file:
+            async for chunk in chunks:
+                if kind is None:
+                    head += chunk[:HEAD_BYTES]
+                    kind = check_head(head, self._limits.pixels) if len(head) >= HEAD_BYTES else None
+                digest.update(chunk)
+                size_bytes += len(chunk)
+                await asyncio.to_thread(_write, file, chunk)
+        return kind or check_head(head, self._limits.pixels), size_bytes, digest.hexdigest()
+
+
+def read_in_child(kind: Kind, source: Path, folder: Path, limits: UploadLimits) -> list[dict[str, Any]]:
+    """Return what the child found; BadInputError if it refused, was killed, or took too long."""
+    arguments = [kind, str(source), str(folder), str(limits.parse_memory_bytes), str(int(limits.parse_s) + 1)]
+    try:
+        # From a thread, not by the event loop: uvloop forks this process, whose other threads may hold locks.
+        done = subprocess.run(
+            [sys.executable, "-I", "-m", "app.files.uploads.child", *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={"PATH": os.defpath, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+            timeout=limits.parse_s,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise BadInputError(
+            f"The file was not read within {limits.parse_s:g} s. Send a smaller one."
+        ) from error
+    if done.returncode == 0:
+        return json.loads(done.stdout)["arrays"]
+    refused = json.loads(done.stdout)["reason"] if done.stdout else None
+    reason = refused or "it needs more memory or time than is allowed"
+    raise BadInputError(f"The file cannot be read: {reason}. Check it in the program that wrote it.")
+
+
+def _write(file: BinaryIO, chunk: bytes) -> None:
+    file.write(chunk)
+
+
+def _publish(hidden: Path, final: Path, manifest: dict[str, Any]) -> None:
+    for path in hidden.iterdir():
+        with path.open("rb") as file:
+            os.fsync(file.fileno())
+    hidden.rename(final)
+    write_json(final / MANIFEST, manifest)

@@ -1,0 +1,1 @@
+"""What an experiment would see and cost, before anybody measures."""

@@ -1,0 +1,213 @@
+"""`plan`: what this experiment would see and cost, before anybody measures. Kept as plan.json beside it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from app.experiment.boundary import read_planes, read_sensors
+from app.experiment.folder import Experiment, open_experiment
+from app.experiment.plan import PLAN_FILE, ChoiceLine, MapLine, Plan, PresetLine, SeenLine, ViewLine
+from app.files.durable import write_json
+from app.files.toml import to_plain
+from app.plan.machine import this_machine
+from app.plan.tradeoff import ExpectedError, expected_error
+from app.reconstruct.measure import Measurement, with_calibration
+from app.reconstruct.presets import REFERENCE, STANDARD
+from core.displacement import resolve_window_px
+from core.metrics import departure, inner, rms
+from core.plan.choice import Choice
+from core.plan.choices import Resolution, resolve
+from core.plan.cost import Speed, Work, draft_work, grid_work, level_of, paper_work, room_work
+from core.plan.expected import ExpectedFlow, expected_flow
+from core.plan.measured import resolve_measured
+from core.plan.observability import seen
+from core.plan.shift_noise import shift_noise
+from core.plan.signal import Signal, other_light, shift_map, signal
+from core.plan.verdicts import blindness, broken, verdict
+from core.problem import Problem
+
+OnStage = Callable[[str], object]
+# JSON has no infinity.
+_LARGEST = 1e30
+
+
+def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lambda stage: None) -> Plan:
+    """Plan an experiment and keep the plan in it. Raises BadInputError, SettingError."""
+    experiment = open_experiment(folder)
+    on_stage("read what is known")
+    problem = stated_problem(experiment)
+    on_stage("march the expected flow coarsely")
+    flow = expected_flow(problem, excess_k)
+    on_stage("noise and signal of each view")
+    signals = signals_of(problem, flow)
+    on_stage("what the views determine")
+    determined = seen(problem, flow, signals)
+    on_stage("resolve the choices")
+    resolution = resolve(problem.scene, flow, signals)
+    views = [_view_line(problem, n, flow, s) for n, s in enumerate(signals)]
+    machine, source = this_machine()
+    made = Plan(
+        expected=flow.source,
+        expected_contrast_k=float(np.abs(flow.excess_k).max()),
+        expected_departure_k=departure_k(flow),
+        views=views,
+        seen=SeenLine(
+            modes=determined.modes,
+            modes_seen=determined.modes_seen,
+            images=determined.images,
+            boundary=determined.boundary,
+            both=determined.both,
+        ),
+        choices=choice_lines(resolution),
+        presets=preset_lines(problem, flow, machine.speeds, windows=[windows_of(s) for s in signals]),
+        machine=source,
+        verdicts=[
+            *(
+                verdict(problem.scene, n, flow, s, view.other_light_shift_p99_px)
+                for n, (s, view) in enumerate(zip(signals, views, strict=True))
+            ),
+            blindness(determined),
+            *broken(resolution.choices),
+        ],
+    )
+    write_json(experiment.folder / PLAN_FILE, to_plain(made))
+    return made
+
+
+def stated_problem(experiment: Experiment) -> Problem:
+    """The problem without its measurements: scene, planes, sensors."""
+    scene, _ = with_calibration(experiment.settings.scene, experiment.bundle_path)
+    return Problem(scene, (), read_planes(experiment, scene), read_sensors(experiment, scene))
+
+
+def departure_k(flow: ExpectedFlow) -> float:
+    """Rms departure of the expected temperature from the mean at each height, as the score takes it."""
+    return rms(departure(inner(flow.excess_k)))
+
+
+def settled(measurement: Measurement, preset: str) -> tuple[Problem, list[ChoiceLine]]:
+    """The measured problem with its `auto` values settled, and the choices as they are told.
+
+    The grid's is the draft's: other presets have levels of their own.
+    """
+    problem = measurement.problem
+    resolution = resolve_measured(problem, measurement.references)
+    grid = resolution.scene.solve.grid if preset == "draft" else problem.scene.solve.grid
+    scene = replace(resolution.scene, solve=replace(problem.scene.solve, grid=grid))
+    made = Problem(scene, problem.shifts, problem.planes, problem.sensors, problem.images)
+    return made, choice_lines(resolution)
+
+
+def choice_lines(resolution: Resolution) -> list[ChoiceLine]:
+    """The choices as they are told."""
+    return [_choice_line(choice) for choice in resolution.choices]
+
+
+def preset_lines(
+    problem: Problem, flow: ExpectedFlow, speeds: dict[str, Speed], windows: list[int]
+) -> list[PresetLine]:
+    """Every preset: time and memory from this machine's speed, error from the reference rooms."""
+    works: dict[str, Work | None] = {
+        "draft": draft_work(problem, sum(windows)),
+        "standard": room_work(problem, flow, STANDARD),
+        "reference": room_work(problem, flow, REFERENCE),
+        "grid": grid_work(problem),
+        "paper": paper_work(),
+    }
+    level, light = level_of(problem), problem.scene.light.kind
+    lines = []
+    for name, work in works.items():
+        speed = speeds.get(name)
+        needs_walls = name in ("standard", "reference")
+        fits = flow.step_s is not None or not needs_walls
+        known = expected_error(name, level, light) if fits else None
+        timed = (work, speed) if work is not None and speed is not None and fits else None
+        lines.append(
+            PresetLine(
+                preset=name,
+                fits=fits,
+                solver_s=timed[1].seconds(timed[0]) if timed else None,
+                memory_mb=timed[1].megabytes(timed[0]) if timed else None,
+                temperature_error_k=known.temperature * departure_k(flow) if known else None,
+                velocity_error=known.velocity if known else None,
+                pressure_error=known.pressure if known else None,
+                reason=_preset_reason(fits, known),
+            )
+        )
+    return lines
+
+
+def _preset_reason(fits: bool, known: ExpectedError | None) -> str:
+    if not fits:
+        return "needs what drives the air: an inlet or a heater in the scene, or a plane with openings"
+    if known is None:
+        return "no reference room was solved with this knowledge and light"
+    return f"error from {known.rooms} runs on reference rooms, times the expected departures"
+
+
+def signals_of(problem: Problem, flow: ExpectedFlow) -> tuple[Signal, ...]:
+    """Signal and noise of every view."""
+    scene = problem.scene
+    return tuple(
+        signal(scene, n, flow, shift_noise(scene, n, resolve_window_px(scene, view)))
+        for n, view in enumerate(scene.views)
+    )
+
+
+def windows_of(found: Signal) -> int:
+    """How many windows a view will measure."""
+    return len(found.shift.centres_px) * found.shift.stride**2
+
+
+def _view_line(problem: Problem, view: int, flow: ExpectedFlow, found: Signal) -> ViewLine:
+    scene, noise_px = problem.scene, found.noise.mean_px
+    other = other_light(scene, view)
+    frames, visible = scene.views[view].frames, np.isfinite(noise_px) and found.snr > 0
+    return ViewLine(
+        name=scene.views[view].name,
+        light=scene.light.kind,
+        window_px=found.noise.window_px,
+        noise_px=noise_px if np.isfinite(noise_px) else None,
+        shift_median_px=found.shift.percentile_px(50),
+        shift_p90_px=found.shift.percentile_px(90),
+        shift_p99_px=found.shift.percentile_px(99),
+        signal_to_noise=found.snr,
+        picture_signal_to_noise=found.picture_snr if np.isfinite(noise_px) else 0.0,
+        smallest_visible_k=found.smallest_visible_k
+        if visible and np.isfinite(found.smallest_visible_k)
+        else None,
+        frames=frames,
+        frames_needed=frames * found.frames_factor if visible and found.frames_factor < 1e12 else None,
+        other_light=other.light.kind,
+        other_light_shift_p99_px=shift_map(other, view, flow, found.noise.window_px).percentile_px(99),
+        map=_map(found),
+    )
+
+
+def _map(found: Signal) -> MapLine:
+    columns, rows = (np.unique(found.shift.centres_px[:, i]) for i in (0, 1))
+    picture = np.full((len(rows), len(columns)), np.nan)
+    at = (
+        np.searchsorted(rows, found.shift.centres_px[:, 1]),
+        np.searchsorted(columns, found.shift.centres_px[:, 0]),
+    )
+    picture[at] = 1e3 * np.linalg.norm(found.shift.displacement_px, axis=1)
+    return MapLine(
+        columns_px=[float(c) for c in columns],
+        rows_px=[float(r) for r in rows],
+        shift_mpx=[[round(float(v), 6) if np.isfinite(v) else None for v in row] for row in picture],
+    )
+
+
+def _choice_line(choice: Choice) -> ChoiceLine:
+    return ChoiceLine(
+        name=choice.name,
+        value=choice.value,
+        bound=min(choice.bound, _LARGEST),
+        limit=min(choice.limit, _LARGEST),
+        unit=choice.unit,
+        cost_share=choice.cost_share,
+        reason=choice.reason,
+    )

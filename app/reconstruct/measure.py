@@ -1,0 +1,172 @@
+"""From captures to `core.problem.Problem`: shifts with their noise, drift taken out, planes and sensors."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32
+from scipy.ndimage import uniform_filter
+
+from app.errors import BadInputError
+from app.experiment.boundary import read_planes, read_sensors
+from app.experiment.captures import Capture, load_capture
+from app.experiment.folder import Experiment
+from core.camera_noise import frame_variance
+from core.displacement import (
+    Similarity,
+    derivative_filter,
+    fit_similarity,
+    measure_shift,
+    move_image,
+    resolve_window_px,
+    similarity_basis,
+    window_centres,
+)
+from core.problem import Problem, ShiftMeasurement
+from core.rays.visibility import sees_wall
+from core.scene import Scene, View
+
+Image = Float32[np.ndarray, "rows cols"]
+
+# A drift below this moves no window by more than the noise of a hundred frames.
+_SMALL_DRIFT_PX = 2e-3
+_DRIFT_PASSES = 3
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """The problem, and what the report shows beside it: images, drift of each view, how it was found."""
+
+    problem: Problem
+    references: tuple[Image, ...]
+    flows: tuple[Image, ...]
+    drifts: tuple[Similarity, ...]
+    notes: tuple[str, ...]
+
+
+def measure(experiment: Experiment, scene: Scene) -> Measurement:
+    """Measure every view of the newest reference and flow captures. Raises BadInputError, SettingError."""
+    reference = load_capture(experiment.latest_capture("reference"))
+    flow = load_capture(experiment.latest_capture("flow"))
+    _check_captures(reference, flow, scene)
+    shifts, drifts, notes = [], [], []
+    for index, view in enumerate(scene.views):
+        shift, drift, note = _measure_view(scene, index, view, reference, flow)
+        shifts.append(shift)
+        drifts.append(drift)
+        notes.append(note)
+    problem = Problem(
+        scene=scene,
+        shifts=tuple(shifts),
+        planes=read_planes(experiment, scene),
+        sensors=read_sensors(experiment, scene),
+    )
+    images = [tuple(image.mean for image in capture.images) for capture in (reference, flow)]
+    return Measurement(problem, images[0], images[1], tuple(drifts), tuple(notes))
+
+
+def _measure_view(
+    scene: Scene, index: int, view: View, reference: Capture, flow: Capture
+) -> tuple[ShiftMeasurement, Similarity, str]:
+    before, after = reference.images[index], flow.images[index]
+    variance = frame_variance(before.mean, view.noise) / before.frames
+    variance += frame_variance(after.mean, view.noise) / after.frames
+    window_px = resolve_window_px(scene, view)
+    # One weight a window: pixel by pixel the darkest would weigh a thousandfold, and with them what the
+    # model leaves out there (clipping, aliasing), which biases a drift of 0.1 px by 1 %.
+    variance = uniform_filter(variance, 2 * window_px)
+    centres = window_centres(before.mean.shape, window_px)
+    in_room = sees_wall(scene, index, centres, margin_px=float(window_px))
+    border = ~sees_wall(scene, index, centres, margin_px=-float(window_px)) & _whole(
+        centres, before.mean.shape
+    )
+    if border.mean() < 0.01:
+        shift = measure_shift(before.mean, after.mean, variance, window_px)
+        note = "No part of the picture is free of the room's air: drift between exposures was not removed."
+        return _select(shift, in_room), Similarity(), note
+    moved, drift = before.mean, Similarity()
+    shift = measure_shift(moved, after.mean, variance, window_px)
+    rest, covariance = fit_similarity(shift, border, before.mean.shape)
+    for _ in range(_DRIFT_PASSES):
+        if max(abs(rest.column_px), abs(rest.row_px)) < _SMALL_DRIFT_PX:
+            break
+        drift = rest.after(drift)
+        moved = move_image(before.mean, drift)
+        shift = measure_shift(moved, after.mean, variance, window_px)
+        rest, covariance = fit_similarity(shift, border, before.mean.shape)
+    static = rest.displacement_px(shift.centres_px, before.mean.shape)
+    shift = replace_displacement(shift, shift.displacement_px - static, covariance, before.mean.shape)
+    total = rest.after(drift)
+    note = (
+        f"Drift between the exposures, from the border: {total.column_px:+.4f} px across, "
+        f"{total.row_px:+.4f} px down, {1e6 * total.rotation_rad:+.1f} urad; removed."
+    )
+    return _select(shift, in_room), total, note
+
+
+def replace_displacement(
+    shift: ShiftMeasurement, displacement_px: np.ndarray, drift_covariance: np.ndarray, shape: tuple[int, int]
+) -> ShiftMeasurement:
+    """The measurement with another displacement, and the drift's own uncertainty added to it."""
+    basis = similarity_basis(shift.centres_px, shape)
+    added = np.einsum("wap,pq,wbq->wab", basis, drift_covariance, basis, optimize=True)
+    information = np.linalg.inv(np.linalg.inv(shift.information_per_px2) + added)
+    return ShiftMeasurement(shift.centres_px, displacement_px, information, shift.window_px)
+
+
+def _whole(centres_px: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Windows whose gradient does not reach beyond the picture's edge."""
+    edge = len(derivative_filter()) // 2
+    return np.all((centres_px > edge) & (centres_px < np.array(shape[::-1]) - 1 - edge), axis=1)
+
+
+def _select(shift: ShiftMeasurement, chosen: np.ndarray) -> ShiftMeasurement:
+    return ShiftMeasurement(
+        shift.centres_px[chosen],
+        shift.displacement_px[chosen],
+        shift.information_per_px2[chosen],
+        shift.window_px,
+    )
+
+
+def _check_captures(reference: Capture, flow: Capture, scene: Scene) -> None:
+    for capture in (reference, flow):
+        if len(capture.images) != len(scene.views):
+            raise BadInputError(
+                f"{capture.folder} holds {len(capture.images)} views; the scene has {len(scene.views)}. "
+                "Capture again with this scene."
+            )
+        for image, view in zip(capture.images, scene.views, strict=True):
+            expected = (view.camera.height_px, view.camera.width_px)
+            if image.mean.shape != expected:
+                raise BadInputError(
+                    f"{capture.folder}: the {capture.role} image is {image.mean.shape[1]} x "
+                    f"{image.mean.shape[0]} px; the calibrated camera {view.name!r} has {expected[1]} x "
+                    f"{expected[0]} px. Calibrate this camera, or capture at its size."
+                )
+            saturated = float(np.mean(image.mean > 0.995))
+            if saturated > 0.01:
+                raise BadInputError(
+                    f"{capture.folder}: {100 * saturated:.1f} % of the {capture.role} image is saturated; "
+                    "expected below 1 %. Shorten the exposure or dim the light, and capture both again."
+                )
+
+
+def with_calibration(scene: Scene, path: Path) -> tuple[Scene, str]:
+    """The scene with the calibrated optics and noise in place of the nominal ones, and a sentence on it."""
+    from calibration.bundle import from_json
+
+    if not path.exists():
+        return scene, "Not calibrated: the optics are those written in experiment.toml."
+    bundle = from_json(path.read_text(encoding="utf-8"), str(path))
+    views = []
+    for view in scene.views:
+        response = bundle.response(view.name)
+        noise = response.noise if response else view.noise
+        views.append(replace(view, camera=bundle.camera(view.name).optics, noise=noise))
+    light = scene.light
+    if bundle.projector is not None and light.kind == "projector":
+        light = replace(light, projector=bundle.projector.optics)
+    source = bundle.camera(scene.views[0].name).quality.source
+    sentence = f"Calibration of {bundle.date}, camera {source}."
+    return replace(scene, views=tuple(views), light=light), sentence

@@ -1,0 +1,71 @@
+"""Named ways to solve: what each costs and what it bought is in README, measured by `airlens bench`."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol, get_args
+
+from app.errors import BadInputError
+from core.geometry import WallName
+from core.problem import Problem
+from core.result import Solution
+from core.scene import Heater, Inlet, Scene, Wall
+from core.solve.draft.draft import solve_draft
+from core.solve.recipes import solve_grid_recipe, solve_paper
+from core.solve.room import RoomSettings, solve_room
+
+OnEvent = Callable[[dict[str, Any]], object]
+
+
+class Solve(Protocol):
+    """A road from a problem to the air."""
+
+    def __call__(self, problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+        """Solve, reporting every recorded iteration."""
+        ...
+
+
+STANDARD = RoomSettings()
+# Where walls are unknown the search may still gain after the eight rounds of `standard`; it ends where it does not.
+REFERENCE = RoomSettings(cells=64, coarse_cells=40, restart_s=80.0, rounds=16, again=4)
+
+
+def solve_standard(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+    """The room marched at 48^3, its boundary corrected by the images: minutes."""
+    return solve_room(problem, STANDARD, on_event=on_event)
+
+
+def solve_reference(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+    """The same at 64^3 and longer."""
+    return solve_room(problem, REFERENCE, on_event=on_event)
+
+
+PRESETS: Mapping[str, Solve] = {
+    "draft": solve_draft,
+    "grid": solve_grid_recipe,
+    "paper": solve_paper,
+    "standard": solve_standard,
+    "reference": solve_reference,
+}
+
+
+def resolved(name: str, scene: Scene) -> str:
+    """`auto` is `standard` where something that drives the air and all walls are stated, else `draft`."""
+    if name != "auto":
+        return name
+    driven = any(isinstance(part, Inlet | Heater) for part in scene.boundary)
+    known = {p.wall for p in scene.boundary if isinstance(p, Wall) and p.thermal != "unknown"}
+    return "standard" if driven and known == set(get_args(WallName)) else "draft"
+
+
+def preset(name: str) -> Solve:
+    """The preset called `name`. Raises BadInputError."""
+    try:
+        return PRESETS[name]
+    except KeyError:
+        raise BadInputError(f"There is no preset {name!r}; known: {', '.join(PRESETS)}.") from None
+
+
+def solve_with(solve: Solve, problem: Problem, **given: Any) -> Solution:
+    """Solve, handing on what this solver takes of `on_event`, `store` and `should_stop`."""
+    taken = inspect.signature(solve).parameters
+    return solve(problem, **{name: value for name, value in given.items() if name in taken})

@@ -1,0 +1,1 @@
+"""What a person reads: the report, its figures, and exports to other programs."""

@@ -1,0 +1,69 @@
+"""`export`: a result as NetCDF (or HDF5), VTK image data, CSV, an OpenFOAM case, or a picture."""
+
+import shutil
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pyevtk.hl import imageToVTK
+
+from app.errors import BadInputError
+from app.experiment.folder import open_experiment
+from app.experiment.results import read_result, to_dataset
+from app.files.durable import write_durably
+from app.report.figures import as_png, slices_figure
+from app.report.openfoam import write_openfoam
+from core.result import Solution
+
+ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png"]
+
+
+def export(folder: Path, kind: ExportFormat, output: Path | None = None, result: Path | None = None) -> Path:
+    """Write the newest (or the given) result in another format and return the file. Raises BadInputError."""
+    experiment = open_experiment(folder)
+    source = (result or experiment.latest_result()) / "result.nc"
+    path = output or source.with_name(f"result-export.{kind}")
+    if path.suffix != f".{kind}":
+        raise BadInputError(f"The output is {path.name}; expected a name that ends in .{kind}.")
+    if kind in ("nc", "h5"):  # NetCDF-4 is HDF5
+        write_durably(path, lambda temporary: shutil.copyfile(source, temporary))
+    else:
+        writers = {"vti": _write_vti, "csv": _write_csv, "zip": write_openfoam, "png": _write_png}
+        writer = writers[kind]
+        solution = read_result(source)
+        write_durably(path, lambda temporary: writer(temporary, solution))
+    return path
+
+
+def _write_vti(path: Path, solution: Solution) -> None:
+    """VTK image data (XML): evenly spaced vertices, T, p and vectors as point data."""
+    dataset = to_dataset(solution, {})
+    points: dict[str, Any] = {
+        str(name): np.asfortranarray(dataset[name].to_numpy())
+        for name in dataset.data_vars
+        if name not in ("u", "v", "w")
+    }
+    if "u" in dataset:
+        components = [np.asfortranarray(dataset[name].to_numpy()) for name in ("u", "v", "w")]
+        points["velocity"] = (components[0], components[1], components[2])
+    axes = (solution.x_m, solution.y_m, solution.z_m)
+    imageToVTK(
+        str(path.with_suffix("")),
+        origin=tuple(float(axis[0]) for axis in axes),
+        spacing=tuple(float((axis[-1] - axis[0]) / (len(axis) - 1)) for axis in axes),
+        pointData=points,
+    )
+
+
+def _write_csv(path: Path, solution: Solution) -> None:
+    """One row a vertex; the header names quantity and unit."""
+    dataset = to_dataset(solution, {})
+    table = dataset.to_dataframe().reset_index()
+    table.columns = [f"{name} [{dataset[name].attrs['units']}]" for name in table.columns]
+    table.to_csv(path, index=False, float_format="%.9g")
+
+
+def _write_png(path: Path, solution: Solution) -> None:
+    """The middle planes of the temperature, with arrows where velocity is known."""
+    level_k = float(np.round(np.mean(solution.temperature_k), 1))
+    path.write_bytes(as_png(slices_figure(solution, level_k)))

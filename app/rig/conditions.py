@@ -1,0 +1,49 @@
+"""How warm the room was and how long the devices had been on: what a calibration and a capture must share."""
+
+import dataclasses
+from dataclasses import dataclass
+
+from app.calibrate.folder import CalibrationFolder
+from app.experiment.folder import ExperimentSettings
+from app.rig.projectors import lamp_journal
+from drivers.projector.lamp_guard import LampGuard
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """None where nobody knows."""
+
+    ambient_temperature_k: float | None = None
+    minutes_on: float | None = None
+
+
+UNTOLD = Conditions()
+
+
+def conditions_of(settings: ExperimentSettings | None, told: Conditions) -> Conditions:
+    """What the operator tells; else the scene's air, and how long ago the rig's lamp was lit."""
+    if settings is None:
+        return told
+    ambient_k, minutes = told.ambient_temperature_k, told.minutes_on
+    if ambient_k is None:
+        ambient_k = settings.scene.air.ambient_temperature_k
+    projector = settings.rig.projector
+    if minutes is None and projector is not None:
+        lit_s = LampGuard(journal=lamp_journal(projector.url)).on_s
+        minutes = None if lit_s is None else lit_s / 60
+    return Conditions(ambient_k, minutes)
+
+
+def seconds_on(settings: ExperimentSettings | None, told: Conditions) -> float | None:
+    """How long the rig has been on [s], where anybody knows."""
+    minutes = conditions_of(settings, told).minutes_on
+    return None if minutes is None else 60 * minutes
+
+
+def note_conditions(calibration: CalibrationFolder, conditions: Conditions) -> None:
+    """Write the conditions into the bundle, if there is one; what is not known leaves what was."""
+    if not (calibration.folder / "bundle.json").exists():
+        return
+    known = {name: value for name, value in dataclasses.asdict(conditions).items() if value is not None}
+    if known:
+        calibration.save_bundle(dataclasses.replace(calibration.bundle(), **known))

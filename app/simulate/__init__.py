@@ -1,0 +1,1 @@
+"""Experiments made from a room volume: the whole chain without hardware."""

@@ -1,0 +1,91 @@
+"""`simulate`: a complete experiment from a room volume, taken by the same capture code as a real one."""
+
+import shutil
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+from app.capture.acquire import acquire
+from app.errors import BadInputError
+from app.experiment.folder import ExperimentSettings, create_experiment
+from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
+from app.files.durable import write_durably, write_text
+from app.volume.file import RoomVolume, read_volume
+from app.volume.scene import Information, RigOptions, room_scene, write_plane
+from calibration.bundle import given_bundle, to_json
+from core.scene import PlaneField, ProjectedPattern, Scene
+from drivers.burst import CapturePlan, Progress
+
+TRUTH_FILE = "truth.npz"
+
+OnStage = Callable[[str, int, int], object]
+
+
+def simulate(
+    truth_path: Path,
+    folder: Path,
+    options: RigOptions,
+    information: Information,
+    camera: SimulatedCameraSettings,
+    on_stage: OnStage = lambda stage, done, total: None,
+) -> Path:
+    """Make an experiment folder from a volume: scene, calibration, reference and flow captures.
+
+    The whole folder appears at once, when it is complete. The truth is copied into it for the simulated
+    rig and `score`; no reconstruction reads it. Raises BadInputError, SettingError.
+    """
+    if folder.exists() and any(folder.iterdir()):
+        raise BadInputError(f"{folder} is not empty; give a new folder for the experiment.")
+    volume = read_volume(truth_path)
+    scene = room_scene(volume, options, information)
+    unfinished = folder.with_name(f".{folder.name}.unfinished")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    try:
+        _fill(unfinished, truth_path, volume, scene, information, camera, on_stage)
+        if folder.exists():
+            folder.rmdir()
+        unfinished.rename(folder)
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+    return folder
+
+
+def _fill(
+    folder: Path,
+    truth_path: Path,
+    volume: RoomVolume,
+    scene: Scene,
+    information: Information,
+    camera: SimulatedCameraSettings,
+    on_stage: OnStage,
+) -> None:
+    settings = ExperimentSettings(
+        title=str(volume.case.get("title", truth_path.stem)),
+        information=information,
+        rig=RigSettings(camera=camera),
+        scene=scene,
+    )
+    experiment = create_experiment(folder, settings)
+    write_durably(folder / TRUTH_FILE, lambda temporary: shutil.copyfile(truth_path, temporary))
+    if any(isinstance(known, PlaneField) for known in scene.boundary):
+        write_plane(folder, volume)
+    write_text(experiment.bundle_path, to_json(_bundle(scene)))
+    for role in ("reference", "flow"):
+        plan = CapturePlan(kind=role, frames=1 if camera.noise_free else scene.views[0].frames)
+
+        def progress(p: Progress, role: str = role) -> None:
+            on_stage(role, p.done, p.total)
+
+        on_stage(role, 0, plan.frames)
+        acquire(experiment, plan, progress)
+
+
+def _bundle(scene: Scene):
+    light = scene.light
+    return given_bundle(
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        cameras={view.name: view.camera for view in scene.views},
+        projector=light.projector if isinstance(light, ProjectedPattern) else None,
+        noise={view.name: view.noise for view in scene.views},
+        back_wall_y_m=scene.room.upper_m[1],
+    )

@@ -1,0 +1,75 @@
+"""A simulated rig to practise with: an experiment before the packaged room, not yet calibrated or captured."""
+
+import shutil
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal
+
+from app.experiment.folder import Experiment, ExperimentSettings, create_experiment, new_id
+from app.experiment.rig_settings import BoardSettings, ProjectorSettings, RigSettings, SimulatedCameraSettings
+from app.files.durable import write_durably, write_text
+from app.simulate.experiment import TRUTH_FILE
+from app.volume.file import read_volume
+from app.volume.scene import Information, RigOptions, room_scene, write_plane
+from calibration.bundle import given_bundle, to_json
+from core.scene import PlaneField, ProjectedPattern
+
+# Fast enough to practise with; a real lamp takes longer, and its lamp guard is the real one.
+TWIN = ProjectorSettings(url="simulated:?warm_up_s=8&cool_down_s=6")
+SAMPLE_ROOM = Path(__file__).resolve().parent / "sample" / "room.npz"
+
+# Large, for it is shown some twenty metres away.
+_BOARD = BoardSettings(columns=9, rows=6, square_m=0.1)
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """What to simulate; a small camera keeps every step within seconds."""
+
+    title: str = "Simulated room"
+    camera_px: int = 384
+    light: Literal["texture", "projector"] = "texture"
+    information: Information = "surveyed"
+
+
+def rehearse(root: Path, wanted: Rehearsal) -> Experiment:
+    """Make the experiment below `root` and return it; it appears at once, when it is complete."""
+    volume = read_volume(SAMPLE_ROOM)
+    options = RigOptions(camera_px=(wanted.camera_px, wanted.camera_px * 3 // 4), light=wanted.light)
+    scene = room_scene(volume, options, wanted.information)
+    settings = ExperimentSettings(
+        title=wanted.title,
+        information=wanted.information,
+        rig=RigSettings(
+            camera=SimulatedCameraSettings(drift_px=0.1),
+            projector=TWIN if wanted.light == "projector" else None,
+            board=_BOARD,
+        ),
+        scene=scene,
+    )
+    name = new_id(root, "simulated")
+    unfinished = root / f".{name}.unfinished"
+    try:
+        create_experiment(unfinished, settings)
+        write_durably(unfinished / TRUTH_FILE, lambda temporary: shutil.copyfile(SAMPLE_ROOM, temporary))
+        if any(isinstance(known, PlaneField) for known in scene.boundary):
+            write_plane(unfinished, volume)
+        unfinished.rename(root / name)
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+    return Experiment(root / name, settings)
+
+
+def calibrate_simulated(experiment: Experiment) -> None:
+    """Write the bundle of a simulated rig, whose models are those of its scene."""
+    scene = experiment.settings.scene
+    light = scene.light
+    bundle = given_bundle(
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        cameras={view.name: view.camera for view in scene.views},
+        projector=light.projector if isinstance(light, ProjectedPattern) else None,
+        noise={view.name: view.noise for view in scene.views},
+        back_wall_y_m=scene.room.upper_m[1],
+    )
+    write_text(experiment.bundle_path, to_json(bundle))

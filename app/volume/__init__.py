@@ -1,0 +1,1 @@
+"""Room volumes (T, p, u on vertices): reading, comparing and scoring them."""

@@ -1,0 +1,97 @@
+"""A result beside what is known better: the truth of a simulated room, and readings of point sensors."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import RegularGridInterpolator
+
+from app.experiment.boundary import read_sensors
+from app.experiment.folder import Experiment
+from app.experiment.rig_settings import SimulatedCameraSettings
+from app.volume.file import Beside, RoomVolume, read_volume
+from app.volume.score import score_solution
+from core.result import Solution
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One quantity at one sensor: measured with its standard deviation, and found there."""
+
+    name: str
+    unit: str
+    position_m: tuple[float, float, float]
+    measured: float
+    std: float
+    found: float
+
+
+def truth_file(experiment: Experiment) -> Path | None:
+    """The volume that a simulated rig looks at; None for a real rig."""
+    camera = experiment.settings.rig.camera
+    if not isinstance(camera, SimulatedCameraSettings):
+        return None
+    path = experiment.folder / camera.room
+    return path if path.is_file() else None
+
+
+def beside_truth(solution: Solution, path: Path) -> list[Beside]:
+    """Every solved quantity beside the truth in `path`; p about its own mean, since its level is free."""
+    truth = read_volume(path)
+    found = [("T", "K", "temperature", solution.temperature_k, _at(solution, truth, truth.temperature_k))]
+    for index, axis in enumerate("xyz"):
+        if solution.velocity_m_s is not None:
+            values = _at(solution, truth, truth.velocity_m_s[..., index])
+            own = solution.velocity_m_s[..., index]
+            found.append(("uvw"[index], "m s-1", f"velocity along {axis}", own, values))
+    if solution.pressure_m2_s2 is not None:
+        values = _at(solution, truth, truth.pressure_m2_s2)
+        own = solution.pressure_m2_s2
+        level = own.mean() - values.mean()
+        found.append(("p", "m2 s-2", "kinematic pressure", own, values + level))
+    return [Beside(name, unit, label, true, own - true) for name, unit, label, own, true in found]
+
+
+def scores(solution: Solution, path: Path) -> dict[str, Any]:
+    """The project's yardstick: see `core.metrics`."""
+    return score_solution(solution, read_volume(path))
+
+
+def readings(experiment: Experiment, solution: Solution) -> list[Reading]:
+    """What the scene's point sensors measured, beside what was found there. Raises BadInputError."""
+    told = []
+    for sensors in read_sensors(experiment, experiment.settings.scene):
+        columns = [("T", "K", sensors.temperature_k, sensors.temperature_std_k, solution.temperature_k)]
+        if solution.velocity_m_s is not None:
+            for i, name in enumerate("uvw"):
+                measured, field = sensors.velocity_m_s[:, i], solution.velocity_m_s[..., i]
+                columns.append((name, "m s-1", measured, sensors.velocity_std_m_s, field))
+        axes = (solution.x_m, solution.y_m, solution.z_m)
+        for name, unit, measured, std, field in columns:
+            there = RegularGridInterpolator(axes, np.asarray(field, np.float64))(sensors.position_m)
+            told += [
+                Reading(name, unit, _triple(place), float(m), float(s), float(f))
+                for place, m, s, f in zip(sensors.position_m, measured, std, there, strict=True)
+                if np.isfinite(m)
+            ]
+    return told
+
+
+def _triple(place: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
+    x, y, z = map(float, place)
+    return x, y, z
+
+
+def _at(
+    solution: Solution, truth: RoomVolume, values: Float[np.ndarray, "tx ty tz"]
+) -> Float[np.ndarray, "nx ny nz"]:
+    """The truth at the result's vertices; the nearest wall outside its box."""
+    axes = (truth.x_m, truth.y_m, truth.z_m)
+    points = [
+        np.clip(own, axis[0], axis[-1])
+        for own, axis in zip((solution.x_m, solution.y_m, solution.z_m), axes, strict=True)
+    ]
+    mesh = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1)
+    return RegularGridInterpolator(axes, np.asarray(values, np.float64))(mesh)

@@ -1,0 +1,266 @@
+"""From a room volume to a scene: the rig that looks at it, and what an operator would know of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from app.errors import BadInputError
+from app.files.durable import durable_path
+from app.volume.file import RoomVolume
+from core.air import GAS_CONSTANT_DRY_AIR_J_KG_K, Air
+from core.geometry import Box, Optics, Vector2, Vector3, WallName, looking_along_y
+from core.scene import (
+    BoundaryInformation,
+    CameraNoise,
+    FixedTexture,
+    Heater,
+    Inlet,
+    Light,
+    Outlet,
+    Patch,
+    PlaneField,
+    ProjectedPattern,
+    Scene,
+    View,
+    Wall,
+    WaveletPattern,
+)
+
+Information = Literal["paper", "operator", "surveyed"]
+RigName = Literal["paper", "lab"]
+
+# The camera sees this much of the wall beyond the room on each side: a border that no flow moves.
+BORDER = 0.03
+# Two windows, and the gradient's reach at the picture's edge.
+BORDER_PX = 36
+# Finest period of a printed pattern, in pattern pixels (half a camera pixel each).
+FINEST_PX = 10.0
+PLANE_FILE = "boundary/plane_x_min.npz"
+
+_WALLS: dict[str, WallName] = {
+    "xMinWall": "x_min",
+    "xMaxWall": "x_max",
+    "front": "y_min",
+    "back": "y_max",
+    "floor": "z_min",
+    "ceiling": "z_max",
+}
+
+
+# Stand-off, and projector minus camera (x, z): the publication's, and the one that `bench placement` recommends.
+RIG_PLACES: Mapping[RigName, tuple[float, Vector2]] = {"paper": (30.5, (1.0, 0.0)), "lab": (4.0, (1.0, 1.0))}
+
+
+@dataclass(frozen=True)
+class RigOptions:
+    """The rig to simulate. Lengths in metres; `baseline_m` is projector minus camera (x, z).
+
+    The picture reaches `border_px` beyond the wall at least, which windows need and single pixels do not.
+    """
+
+    camera_px: tuple[int, int] = (4096, 3072)
+    light: Literal["texture", "projector"] = "texture"
+    frames: int = 100
+    full_well_e: float = 10_000.0
+    stand_off_m: float = RIG_PLACES["paper"][0]
+    baseline_m: Vector2 = RIG_PLACES["paper"][1]
+    projector_px: tuple[int, int] = (1920, 1200)
+    pattern_seed: int = 0
+    border_px: int = BORDER_PX
+
+    def __post_init__(self) -> None:
+        if self.frames < 1 or self.full_well_e <= 0 or min(self.camera_px) < 16:
+            raise BadInputError(
+                f"frames {self.frames}, full well {self.full_well_e:g} e-, camera {self.camera_px} px: expected "
+                "at least 1 frame, a positive full well, and a camera of 16 x 16 px or more."
+            )
+
+
+def room_scene(volume: RoomVolume, options: RigOptions, information: Information) -> Scene:
+    """The scene that `information` lets an operator write down. Raises BadInputError, SettingError."""
+    room = room_box(volume)
+    if options.stand_off_m <= 0:
+        raise BadInputError(
+            f"The stand-off is {options.stand_off_m:g} m; expected the distance from camera to back wall, "
+            "above 0."
+        )
+    camera = _covering(room, options.camera_px, options.border_px, options.stand_off_m, (0.0, 0.0))
+    noise = CameraNoise(full_well_e=options.full_well_e)
+    return Scene(
+        room=room,
+        air=_air(volume),
+        views=(View(camera=camera, noise=noise, frames=options.frames),),
+        light=_light(room, camera, options),
+        boundary=tuple(known_boundary(volume, information)),
+    )
+
+
+def room_box(volume: RoomVolume) -> Box:
+    """The box that the volume's vertices span."""
+    axes = (volume.x_m, volume.y_m, volume.z_m)
+    x, y, z = ((_round(axis[0]), _round(axis[-1])) for axis in axes)
+    return Box(lower_m=(x[0], y[0], z[0]), upper_m=(x[1], y[1], z[1]))
+
+
+def known_boundary(volume: RoomVolume, information: Information) -> list[BoundaryInformation]:
+    """What the level of information tells: `paper` the plane, `operator` patches and walls, `surveyed` all."""
+    known: list[BoundaryInformation] = []
+    if information in ("paper", "surveyed"):
+        known.append(PlaneField(file=PLANE_FILE))
+    if information in ("operator", "surveyed"):
+        if not volume.case:
+            raise BadInputError(
+                f"The volume does not describe its inlets and walls (no case in meta_json), which "
+                f"--information {information} needs. Use --information paper."
+            )
+        known += [_inlet(inlet, volume) for inlet in volume.case.get("inlets", [])]
+        known += _outlet(volume)
+        known += [_wall(name, wall, volume, information) for name, wall in _WALLS.items()]
+    if information == "surveyed" and volume.case.get("heater"):
+        known.append(_heater(volume))
+    return known
+
+
+def write_plane(folder: Path, volume: RoomVolume) -> Path:
+    """T, p, u of the plane x = x_min, as `PlaneField` names it."""
+    path = folder / PLANE_FILE
+    with durable_path(path) as temporary:
+        np.savez_compressed(
+            temporary,
+            y=volume.y_m,
+            z=volume.z_m,
+            T=volume.temperature_k[0],
+            p=volume.pressure_m2_s2[0],
+            u=volume.velocity_m_s[0],
+        )
+    return path
+
+
+def _air(volume: RoomVolume) -> Air:
+    """Air with the volume's own density and Gladstone-Dale coefficient."""
+    return Air(
+        pressure_pa=volume.density_kg_m3 * GAS_CONSTANT_DRY_AIR_J_KG_K * volume.ambient_k,
+        ambient_temperature_k=volume.ambient_k,
+        gladstone_dale=volume.gladstone_dale_m3_kg,
+        kinematic_viscosity_m2_s=float(volume.scalars.get("nu", 1.5e-5)),
+        prandtl=float(volume.scalars.get("Pr", 0.71)),
+    )
+
+
+def _covering(
+    room: Box, size_px: tuple[int, int], border_px: int, stand_off_m: float, baseline_m: Vector2
+) -> Optics:
+    """Optics at the stand-off whose panel covers the back wall and a border; shifted like a lens, not tilted."""
+    centre = room.centre_m
+    border = max(BORDER, border_px / size_px[0])
+    width, height = (room.size_m[axis] * (1 + 2 * border) for axis in (0, 2))
+    focal_px = stand_off_m * min(size_px[0] / width, size_px[1] / height)
+    position: Vector3 = (
+        centre[0] + baseline_m[0],
+        room.upper_m[1] - stand_off_m,
+        centre[2] + baseline_m[1],
+    )
+    # The wall's centre stays at the panel's centre: to the left of a projector that stands to the right.
+    principal = (
+        (size_px[0] - 1) / 2 + focal_px * baseline_m[0] / stand_off_m,
+        (size_px[1] - 1) / 2 - focal_px * baseline_m[1] / stand_off_m,
+    )
+    return looking_along_y(
+        position_m=position,
+        width_px=size_px[0],
+        height_px=size_px[1],
+        focal_px=focal_px,
+        principal_px=principal,
+    )
+
+
+def _light(room: Box, camera: Optics, options: RigOptions) -> Light:
+    pixel_m = options.stand_off_m / camera.focal_px[0]
+    if options.light == "texture":
+        # Printed twice as fine as the camera's pixels; the finest band is 5 of these. Finer bands alias
+        # in the camera: at 3 px a drift of 0.1 px is measured 0.6 % wrong, at 5 px 0.2 %.
+        return FixedTexture(
+            pattern=WaveletPattern(seed=options.pattern_seed, finest_px=FINEST_PX), pixel_m=pixel_m / 2
+        )
+    projector = _covering(
+        room, options.projector_px, options.border_px, options.stand_off_m, options.baseline_m
+    )
+    # The finest band: at least 2 projector pixels and at least 3 camera pixels.
+    magnification = camera.focal_px[0] / projector.focal_px[0]
+    finest = max(2.0, 3.0 / magnification)
+    return ProjectedPattern(
+        pattern=WaveletPattern(seed=options.pattern_seed, finest_px=finest), projector=projector
+    )
+
+
+def _inlet(inlet: dict[str, Any], volume: RoomVolume) -> Inlet:
+    return Inlet(
+        patch=_patch(inlet),
+        temperature_k=volume.ambient_k + float(inlet["dT"]),
+        velocity_m_s=(float(inlet["U"]), 0.0, 0.0),
+        turbulence_intensity=float(volume.case.get("TI", 0.1)),
+        length_scale_m=_length_scale_m(inlet, volume),
+    )
+
+
+def _length_scale_m(inlet: dict[str, Any], volume: RoomVolume) -> float | None:
+    """A case states it as a share of the patch's hydraulic diameter, as CFD programs' users do."""
+    share = volume.case.get("lscale")
+    return None if share is None else float(share) * _patch(inlet).hydraulic_diameter_m
+
+
+def _outlet(volume: RoomVolume) -> list[Outlet]:
+    if not volume.case.get("outlet"):
+        return []
+    patch = _patch(volume.case["outlet"])
+    return [Outlet(patch=patch, mean_temperature_k=_mean_on_plane(volume, patch))]
+
+
+def _mean_on_plane(volume: RoomVolume, patch: Patch) -> float:
+    """Mean temperature over a patch of the plane x_min."""
+    inside_y, inside_z = (
+        (axis >= low - 1e-6) & (axis <= high + 1e-6)
+        for axis, low, high in zip((volume.y_m, volume.z_m), patch.lower_m, patch.upper_m, strict=True)
+    )
+    values = volume.temperature_k[0][np.ix_(inside_y, inside_z)]
+    if values.size == 0:
+        raise BadInputError(
+            f"The outlet {patch.lower_m} to {patch.upper_m} m lies between the volume's vertices; "
+            "resample the volume on a finer grid."
+        )
+    return float(values.mean(dtype=np.float64))
+
+
+def _wall(name: str, wall: WallName, volume: RoomVolume, information: Information) -> Wall:
+    if information == "operator":
+        return Wall(wall=wall)
+    if name in volume.case.get("adiabatic_walls", []):
+        return Wall(wall=wall, thermal="adiabatic")
+    given = volume.case.get("wall_T") or {}
+    if name in given:
+        return Wall(wall=wall, thermal="temperature", temperature_k=float(given[name]))
+    if name in volume.case.get("isothermal_walls", []):
+        return Wall(wall=wall, thermal="temperature", temperature_k=volume.ambient_k)
+    return Wall(wall=wall)
+
+
+def _heater(volume: RoomVolume) -> Heater:
+    heater = volume.case["heater"]
+    x, y = heater["x"], heater["y"]
+    return Heater(
+        patch=Patch(wall="z_min", lower_m=(float(x[0]), float(y[0])), upper_m=(float(x[1]), float(y[1]))),
+        temperature_k=volume.ambient_k + float(heater["dT"]),
+    )
+
+
+def _patch(box: dict[str, Any]) -> Patch:
+    y, z = box["y"], box["z"]
+    return Patch(wall="x_min", lower_m=(float(y[0]), float(z[0])), upper_m=(float(y[1]), float(z[1])))
+
+
+def _round(value: float) -> float:
+    """Float32 coordinates as a person wrote them."""
+    return round(float(value), 6)

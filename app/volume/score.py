@@ -1,0 +1,64 @@
+"""`score`: a result against the truth, beside the trivial answers."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from app.experiment.folder import open_experiment, read_manifest
+from app.experiment.results import read_result
+from app.volume.file import RoomVolume, read_volume
+from core.metrics import score_pressure, score_temperature, score_velocity
+from core.result import Solution
+
+
+def score_experiment(folder: Path, truth_path: Path, result: Path | None = None) -> dict[str, Any]:
+    """Score the newest (or the given) result of an experiment. Raises BadInputError."""
+    experiment = open_experiment(folder)
+    result_folder = result or experiment.latest_result()
+    solution = read_result(result_folder / "result.nc")
+    scores = score_solution(solution, read_volume(truth_path))
+    manifest = read_manifest(result_folder)
+    return {
+        "experiment": str(folder),
+        "result": result_folder.name,
+        "preset": manifest.get("preset"),
+        "information": experiment.settings.information,
+        **scores,
+        "outcome": solution.outcome.name,
+        "solver_s": solution.solver_s,
+        "wall_s": manifest.get("wall_s"),
+    }
+
+
+def score_solution(solution: Solution, truth: RoomVolume) -> dict[str, Any]:
+    """T, u, p scores at the truth's vertices; u and p are None where the solution has none."""
+    temperature = values_at(truth, solution, solution.temperature_k)
+    scores: dict[str, Any] = {
+        "T": score_temperature(temperature, truth.temperature_k, truth.ambient_k),
+        "u": None,
+        "p": None,
+    }
+    if solution.velocity_m_s is not None:
+        supply = max((abs(i["U"]) for i in truth.case.get("inlets", [])), default=0.0)
+        supply = supply or float(np.linalg.norm(truth.velocity_m_s, axis=-1).max())
+        scores["u"] = score_velocity(
+            values_at(truth, solution, solution.velocity_m_s), truth.velocity_m_s, supply
+        )
+    if solution.pressure_m2_s2 is not None:
+        scores["p"] = score_pressure(
+            values_at(truth, solution, solution.pressure_m2_s2), truth.pressure_m2_s2
+        )
+    return scores
+
+
+def values_at(truth: RoomVolume, solution: Solution, values: np.ndarray) -> np.ndarray:
+    """The solution's values at the truth's vertices (trilinear; the nearest wall outside the box)."""
+    axes = (solution.x_m, solution.y_m, solution.z_m)
+    points = [
+        np.clip(axis, own[0], own[-1])
+        for axis, own in zip((truth.x_m, truth.y_m, truth.z_m), axes, strict=True)
+    ]
+    mesh = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1)
+    return RegularGridInterpolator(axes, np.asarray(values, np.float64))(mesh)

@@ -1,0 +1,1 @@
+"""Estimate a room from measurements: prior, observation operator, fit, posterior, diagnostics."""

@@ -1,0 +1,100 @@
+"""What the balance of heat says of walls: supply brings it, walls and what leaves take it.
+
+A thermometer in what leaves is worth a number that nobody can state: the walls' common heat coefficient, or the one
+temperature of walls that nobody knows.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from core.estimate.plane_openings import air_planes, still_vertices
+from core.problem import Problem
+from core.room.boundary_conditions import RoomLayout
+from core.room.grid import WALLS
+from core.room.k_epsilon import NOMINAL_HEAT_M_S
+from core.scene import Outlet
+
+# 1.6 W/m2K over rho c.
+WALL_HEAT_M_S = NOMINAL_HEAT_M_S
+
+
+def outflow_excess_k(problem: Problem) -> float | None:
+    """Temperature of the leaving air, by an outlet's thermometer or a plane's outflow; None if unknown."""
+    ambient = problem.scene.air.ambient_temperature_k
+    for part in problem.scene.boundary:
+        if isinstance(part, Outlet) and part.mean_temperature_k is not None:
+            return part.mean_temperature_k - ambient
+    for plane in problem.planes:
+        axis = WALLS.index(plane.wall) // 2
+        outward = plane.velocity_m_s[..., axis] * (-1.0 if plane.wall.endswith("min") else 1.0)
+        leaving = np.maximum(outward, 0.0)
+        if leaving.sum() > 0:
+            return float((leaving * (plane.temperature_k - ambient)).sum() / leaving.sum())
+    return None
+
+
+def free_walls_k(
+    problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
+) -> tuple[float, float]:
+    """The one temperature of all unknown walls that closes the heat balance, and its distance from the air.
+
+    Without a thermometer in what leaves it is the ambient one; it stays within the supply's contrast.
+    """
+    leaving = outflow_excess_k(problem)
+    if leaving is None or not layout.inlets:
+        return 0.0, 0.0
+    areas = _heated_areas_m2(layout)
+    free = areas * (layout.held == 0)
+    if free.sum() == 0:
+        return 0.0, 0.0
+    inside = _room_excess_k(problem, leaving)
+    brought = float(np.dot(supply_m3_s(layout), inlet_excess_k - leaving))
+    known = WALL_HEAT_M_S * float(((areas - free) * (inside - wall_excess_k)).sum())
+    apart = (brought - known) / (WALL_HEAT_M_S * float(free.sum()))
+    contrast = max(float(np.abs(inlet_excess_k).max()), abs(inside))
+    apart = float(np.clip(apart, -contrast, contrast))
+    return inside - apart, abs(apart)
+
+
+def _heated_areas_m2(layout: RoomLayout) -> Float[np.ndarray, "6"]:
+    """Area of each wall that passes heat."""
+    grid = layout.grid
+    return (
+        np.array([grid.face_area_m2(w // 2) * np.prod(grid.plane(w // 2)) for w in range(6)]) * layout.heated
+    )
+
+
+def supply_m3_s(layout: RoomLayout) -> Float[np.ndarray, " inlets"]:
+    """Volume flow of each inlet as stated."""
+    return np.array(
+        [
+            o.inward * v[o.axis] * o.area_m2
+            for o, v in zip(layout.inlets, layout.inlet_velocity_m_s, strict=True)
+        ]
+    )
+
+
+def heat_balance_m_s(
+    problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
+) -> float | None:
+    """One heat coefficient for all walls that closes the balance, within a factor of four of the guess; or None."""
+    leaving = outflow_excess_k(problem)
+    areas = _heated_areas_m2(layout)
+    if leaving is None or not layout.inlets or layout.heaters or areas.sum() == 0:
+        return None
+    brought = float(np.dot(supply_m3_s(layout), inlet_excess_k - leaving))
+    inside = _room_excess_k(problem, leaving)
+    lost = float((areas * (inside - wall_excess_k)).sum())
+    # Heat that flows from cold to warm says that something else is missing, not how well walls conduct.
+    if not brought * lost > 0:
+        return None
+    return float(np.clip(brought / lost, WALL_HEAT_M_S / 4, WALL_HEAT_M_S * 4))
+
+
+def _room_excess_k(problem: Problem, leaving: float) -> float:
+    """Mean temperature of the room's air: a side wall's plane, else what leaves."""
+    for plane in air_planes(problem):
+        return (
+            float(plane.temperature_k[still_vertices(plane)].mean()) - problem.scene.air.ambient_temperature_k
+        )
+    return leaving

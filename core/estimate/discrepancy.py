@@ -1,0 +1,185 @@
+"""What parameters leave unexplained: a smooth temperature correction, the same along the view.
+
+    T <- T + sum c_ij b_i(x) b_j(z),   c ~ normal(0, K),   linear least squares on the last misfit
+
+A view's rays run along y, so a single view sees only the mean along them. K lets profiles of height err
+further than patches of the section, and the level of all as far as what was stated leaves it open: images
+do not see it, thermometers do (a plane, an outlet's, sensors). A plane on a wall of unknown temperature lies
+in a layer that the room may have wrong everywhere alike. Held walls keep their temperature. Velocity is left
+alone: nudging it to fit images does not repair it.
+"""
+
+from collections.abc import Collection
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import block_diag
+
+from core.estimate.least_squares import spread
+from core.estimate.observation import IMAGES, PLANES, Observations, ShiftBlocks
+from core.room.grid import AXES, WALLS
+from core.room.vertices import linear_matrix
+
+# Neighbouring data err together: so many count as one.
+_CORRELATED = 4.0
+_LATTICE = (9, 11)
+_LENGTH_SHARE = 0.2
+# Of the misfit that is left, this share is taken for what no smooth correction can explain.
+_UNEXPLAINED = 0.5
+# As shares of the departures from a level: the correction's own, where images pull no further without harm;
+# how far air at one point is from its section; a plane's layer on a wall of unknown temperature.
+_DEPARTURE_SHARE, _POINT_SHARE, _LAYER_SHARE = 0.1, 0.3, 1.0
+
+
+class Correction(eqx.Module):
+    """The correction on vertices, and its variance before and after the data, all the same along y."""
+
+    excess_k: Float[np.ndarray, "vx vz"]
+    prior_variance_k2: Float[np.ndarray, "vx vz"]
+    variance_k2: Float[np.ndarray, "vx vz"]
+
+
+def temperature_correction(
+    data: Observations,
+    excess_k: Float[np.ndarray, "vx vy vz"],
+    residual: Float[np.ndarray, " data"],
+    departure_k: float,
+    level_std_k: float,
+    unknown_walls: Collection[str] = (),
+) -> Correction:
+    """Fit the correction to `residual` (data minus prediction of `excess_k`).
+
+    `departure_k` is the size of the room's departures from a level; `level_std_k` how far the level may be off.
+    """
+    nx, _, nz = excess_k.shape
+    along_x, along_z = (
+        linear_matrix(np.linspace(0, 1, m), np.linspace(0, 1, n))
+        for m, n in zip(_LATTICE, (nx, nz), strict=True)
+    )
+    basis = np.einsum("xi,zj->ijxz", along_x, along_z).reshape(-1, nx, nz)
+    _, variance, group = data.values()
+    prior = _prior_k2(_DEPARTURE_SHARE * departure_k) + level_std_k**2
+    layers = sum(plane.wall in unknown_walls for plane in data.planes)
+    layer = np.eye(layers) / (_LAYER_SHARE * departure_k) ** 2
+    known = np.asarray(block_diag(np.linalg.inv(prior), layer))
+    gained = np.zeros(len(known))
+    for g, design in (
+        (IMAGES, _shift_design(data, excess_k, basis)),
+        (PLANES, _plane_design(data, excess_k, basis)),
+        (2, _sensor_design(data)),
+        (4, _outlet_design(data)),
+    ):
+        own = group == g
+        if own.any():
+            # A thermometer stands in one place, which no smooth correction describes.
+            pooled = g in (IMAGES, PLANES)
+            error = _UNEXPLAINED * spread(residual[own]) if pooled else _POINT_SHARE * departure_k
+            weight = 1.0 / (variance[own] + error**2) / (_CORRELATED if pooled else 1.0)
+            extra = _layer_design(data, unknown_walls) if g == PLANES else np.zeros((len(design), layers))
+            whole = np.concatenate([design, extra], axis=1)
+            known = known + (whole.T * weight) @ whole
+            gained = gained + (whole.T * weight) @ residual[own]
+    size = len(basis)
+    covariance = np.linalg.inv(known)
+    coefficients = (covariance @ gained)[:size]
+    before, after = (
+        np.einsum("ixz,ixz->xz", basis, np.tensordot(c, basis, axes=1))
+        for c in (prior, covariance[:size, :size])
+    )
+    return Correction(np.tensordot(coefficients, basis, axes=1), before, after)
+
+
+def _layer_design(data: Observations, unknown_walls: Collection[str]) -> Float[np.ndarray, "data layers"]:
+    """Plane temperatures of every block per kelvin of the layer of each plane on an unknown wall."""
+    blocks = data.plane_blocks()
+    columns = np.repeat(np.eye(len(blocks)), blocks, axis=0)
+    return columns[:, [plane.wall in unknown_walls for plane in data.planes]]
+
+
+def _prior_k2(std_k: float) -> Float[np.ndarray, "lattice lattice"]:
+    """Covariance: half of it a function of height alone, half local; correlated over a fifth of the room."""
+    x, z = (np.linspace(0, 1, m) for m in _LATTICE)
+    near_x = np.exp(-np.abs(x[:, None] - x[None, :]) / _LENGTH_SHARE)
+    near_z = np.exp(-np.abs(z[:, None] - z[None, :]) / _LENGTH_SHARE)
+    size = len(x) * len(z)
+    kernel = 0.7 * np.ones_like(near_x)[:, None, :, None] + 0.3 * near_x[:, None, :, None]
+    covariance = (kernel * near_z[None, :, None, :]).reshape(size, size)
+    return std_k**2 * (covariance + 1e-6 * np.eye(size))
+
+
+def _sensor_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
+    """Sensors' temperatures per kelvin of every coefficient."""
+    points = [s.position_m[np.isfinite(s.temperature_k)] for s in data.sensors]
+    return _at_points(data, np.concatenate([np.zeros((0, 3)), *points]))
+
+
+def _outlet_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
+    """The outlet's mean temperature per kelvin of every coefficient: of the whole section at its height.
+
+    At its wall, which windows do not see, the correction is but the continuation of what is beside it.
+    """
+    rows = [np.zeros((0, _LATTICE[0] * _LATTICE[1]))]
+    for outlet in data.outlets:
+        patch, wall = outlet.patch, WALLS.index(outlet.patch.wall)
+        box = data.scene.room
+        first, second = (a for a in AXES if a != wall // 2)
+        steps = (np.arange(5) + 0.5) / 5
+        points = np.zeros((5, 5, 3))
+        points[..., wall // 2] = (box.lower_m, box.upper_m)[wall % 2][wall // 2]
+        points[..., first] = (patch.lower_m[0] + steps * (patch.upper_m[0] - patch.lower_m[0]))[:, None]
+        points[..., second] = (patch.lower_m[1] + steps * (patch.upper_m[1] - patch.lower_m[1]))[None, :]
+        row = _at_points(data, points.reshape(-1, 3)).mean(axis=0).reshape(_LATTICE)
+        rows.append(np.broadcast_to(row.sum(0) / _LATTICE[0], _LATTICE).reshape(1, -1))
+    return np.concatenate(rows)
+
+
+def _at_points(
+    data: Observations, points_m: Float[np.ndarray, "points 3"]
+) -> Float[np.ndarray, "points lattice"]:
+    """Every basis function at points."""
+    box = data.scene.room
+    share = (points_m - np.asarray(box.lower_m)) / np.asarray(box.size_m)
+    x, z = (
+        linear_matrix(np.linspace(0, 1, m), np.clip(share[:, a], 0.0, 1.0))
+        for a, m in zip((0, 2), _LATTICE, strict=True)
+    )
+    return np.einsum("pi,pj->pij", x, z).reshape(len(points_m), _LATTICE[0] * _LATTICE[1])
+
+
+def _shift_design(
+    data: Observations, excess_k: Float[np.ndarray, "vx vy vz"], basis: Float[np.ndarray, "lattice vx vz"]
+) -> Float[np.ndarray, "blocks lattice"]:
+    """Shifts of every block per kelvin of every coefficient."""
+    air = data.scene.air
+    slope = (
+        -air.ambient_refractivity * air.ambient_temperature_k / (air.ambient_temperature_k + excess_k) ** 2
+    )
+    fields = jnp.asarray(basis[:, :, None, :] * slope[None], jnp.float32)
+    columns = [
+        np.stack([block.pooled(d).ravel() for d in _shifts(block, fields)], axis=1) for block in data.shifts
+    ]
+    if not columns:
+        return np.zeros((0, len(basis)))
+    design = np.concatenate(columns)
+    # A kelvin more bends light 0.7 % less: far below what a room has wrong, so images are not asked for the level.
+    return design - design.mean(axis=1, keepdims=True)
+
+
+def _shifts(
+    block: ShiftBlocks, fields: Float[jax.Array, "lattice vx vy vz"]
+) -> Float[np.ndarray, "lattice windows 2"]:
+    run = eqx.filter_jit(lambda operator, many: jax.lax.map(operator.apply, many))
+    return np.asarray(run(block.operator, fields))
+
+
+def _plane_design(
+    data: Observations, excess_k: Float[np.ndarray, "vx vy vz"], basis: Float[np.ndarray, "lattice vx vz"]
+) -> Float[np.ndarray, "blocks lattice"]:
+    """Plane temperatures of every block per kelvin of every coefficient."""
+    if not data.planes:
+        return np.zeros((0, len(basis)))
+    fields = np.broadcast_to(basis[:, :, None, :], (len(basis), *excess_k.shape))
+    return np.stack([data.plane_values(field) for field in fields], axis=1)

@@ -1,0 +1,78 @@
+"""The fine room's parameters where walls are unknown: a search for many numbers that are far off.
+
+Each wall may be off by half the supply's excess, and walls, supply and closure make up for one another: derivatives
+of a coarse room mislead soon, and a step cut parameter by parameter ends in a corner.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+from core.estimate.forward_runs import Attempt, Derivatives, Event, RoomSettings, attempt
+from core.estimate.least_squares import LONGEST_STEP, Posterior
+from core.estimate.observation import Observations
+from core.estimate.parameter_fit import GAIN, PATIENCE, Fit
+from core.estimate.parameter_step import Jacobian, Vector, corrected, farthest, fitted, misfit_ratio, secant
+from core.estimate.prior import Prior
+from core.room.forward import Room
+
+
+def fine_search(
+    fine: Room,
+    prior: Prior,
+    data: Observations,
+    first: Attempt,
+    derivatives: Derivatives,
+    made_again: Callable[[Vector], Derivatives],
+    settings: RoomSettings,
+    tell: Event,
+) -> tuple[Fit, Derivatives]:
+    """The fine room's parameters and best march, and the last derivatives.
+
+    Steps are damped, a room that is farther from the data than the one before is not gone on from, and every march
+    corrects the Jacobian. Derivatives are `made_again` after every other round that moved far, and where the old
+    ones have no more to say, `settings.again` times.
+    """
+    linearised = np.zeros(len(prior.active()))
+    best = Fit(Posterior(linearised, np.eye(len(linearised)), np.zeros(0)), first)
+    grid_difference = data.predicted(first.seen) - data.predicted(derivatives.start)
+    stale, again, reach = 0, settings.again, LONGEST_STEP
+    jacobian = derivatives.per_deviation(data.predicted).T
+    for n in range(settings.rounds):
+        new = searched(fine, prior, data, best, jacobian, grid_difference, reach, settings, tell)
+        left = misfit_ratio(data, new.room, best.room)
+        tell({"round": n + 1.0, "misfit_left": left, **fitted(prior, new.posterior.vector)})
+        change = data.predicted(new.room.seen) - data.predicted(best.room.seen)
+        jacobian = secant(jacobian, new.posterior.vector - best.posterior.vector, change)
+        step = farthest(new.posterior.vector, best.posterior.vector)
+        best, reach = (new, LONGEST_STEP) if left < 1.0 else (best.known_as(new), 0.5 * step)
+        stale = 0 if left < GAIN else stale + 1
+        done = step < settings.fine_step or stale == PATIENCE
+        enough = settings.fine_step if done else settings.straight_walls
+        away = farthest(best.posterior.vector, linearised)
+        if again > 0 and (done or n % 2 == 1) and away > enough:
+            again, linearised, stale, reach = again - 1, best.posterior.vector, 0, LONGEST_STEP
+            derivatives = made_again(linearised)
+            jacobian = derivatives.per_deviation(data.predicted).T
+        elif done:
+            break
+    return best, derivatives
+
+
+def searched(
+    fine: Room,
+    prior: Prior,
+    data: Observations,
+    best: Fit,
+    jacobian: Jacobian,
+    grid_difference: Float[np.ndarray, " data"],
+    reach: float,
+    settings: RoomSettings,
+    tell: Event,
+) -> Fit:
+    """One damped step from the best room, in which no parameter moves by more than `reach`, and its march."""
+    where, firm = best.posterior.vector, prior.firm()
+    asked = corrected(where, best.room, data, jacobian, grid_difference, firm=firm, reach=reach)
+    parameters, flow = prior.parameters(asked.vector), best.room.flow.last
+    return Fit(asked, attempt(fine, parameters, flow, settings.refine_s, data.vertices, tell))

@@ -1,0 +1,221 @@
+"""What measurements say about a room, and what a flow would have shown: the same vector of data.
+
+Shifts are pooled into blocks about two cells wide, since a coarse room cannot answer for less, and
+windows beside walls are left out: the thermal layer there is thinner than any cell. A plane of known T is
+pooled likewise. Every datum has its own noise; what the grid cannot represent is added by the fit.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+from scipy.interpolate import RegularGridInterpolator
+
+from core.estimate.plane_openings import still_vertices
+from core.geometry import Box
+from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
+from core.rays.operator import StraightRayOperator, build
+from core.rays.optics import pinhole
+from core.room.grid import AXES, WALLS
+from core.room.vertices import linear_matrix
+from core.scene import Outlet, Scene
+
+_BLOCKS_ACROSS = 28
+_WALL_MARGIN = 0.06
+# Groups of `Observations.values` whose neighbouring data err together.
+IMAGES, PLANES = 0, 1
+
+
+class ShiftBlocks(eqx.Module):
+    """Pooled shifts of one view: `row[w]` is the block of window w, -1 for a window left out."""
+
+    operator: StraightRayOperator
+    row: Int[np.ndarray, " windows"]
+    weight: Float[np.ndarray, "windows 2 2"]
+    displacement_px: Float[np.ndarray, "blocks 2"]
+    variance_px2: Float[np.ndarray, "blocks 2"]
+
+    def predicted(self, excess_refractivity: Float[Array, "vx vy vz"]) -> Float[np.ndarray, "blocks 2"]:
+        """The blocks' shifts for a refractivity on the operator's vertices."""
+        return self.pooled(np.asarray(_apply(self.operator, excess_refractivity)))
+
+    def pooled(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Float[np.ndarray, "blocks 2"]:
+        """Information-weighted mean of the windows of each block."""
+        total = np.zeros_like(self.displacement_px)
+        used = self.row >= 0
+        np.add.at(total, self.row[used], np.einsum("wij,wj->wi", self.weight, displacement_px)[used])
+        return total
+
+
+@eqx.filter_jit
+def _apply(
+    operator: StraightRayOperator, excess_refractivity: Float[Array, "vx vy vz"]
+) -> Float[Array, "windows 2"]:
+    return operator.apply(excess_refractivity)
+
+
+def shift_blocks(
+    scene: Scene, view: int, measured: ShiftMeasurement, vertices: tuple[int, int, int]
+) -> ShiftBlocks | None:
+    """Pool one view's windows; None if no window sees the wall away from its edges."""
+    operator = build(scene, view, measured.centres_px, vertices, float(measured.window_px))
+    block_px = _block_px(scene.room, operator, measured)
+    cell = np.floor(measured.centres_px / block_px).astype(int)
+    used = _sees_the_middle(scene, view, measured.centres_px)
+    if not used.any():
+        return None
+    key = cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1]
+    row = np.full(len(key), -1)
+    row[used] = np.unique(key[used], return_inverse=True)[1]
+    total = np.zeros((row.max() + 1, 2, 2))
+    np.add.at(total, row[used], measured.information_per_px2[used])
+    covariance = np.linalg.inv(total)
+    weight = np.einsum("wij,wjk->wik", covariance[np.maximum(row, 0)], measured.information_per_px2)
+    blocks = ShiftBlocks(
+        operator, row, weight, np.zeros(total.shape[:2]), np.diagonal(covariance, axis1=1, axis2=2).copy()
+    )
+    return eqx.tree_at(lambda b: b.displacement_px, blocks, blocks.pooled(measured.displacement_px))
+
+
+def _block_px(room: Box, operator: StraightRayOperator, measured: ShiftMeasurement) -> float:
+    """Block edge in px: the room's longer side in `_BLOCKS_ACROSS`, at least one window."""
+    scale = np.asarray(operator.px_per_m)
+    px_per_m = float(np.median(np.abs(np.linalg.det(scale[np.abs(scale).sum((1, 2)) > 0]))) ** 0.5)
+    wanted = max(room.size_m[0], room.size_m[2]) / _BLOCKS_ACROSS * px_per_m
+    return max(1.0, np.round(wanted / measured.window_px)) * measured.window_px
+
+
+def _sees_the_middle(scene: Scene, view: int, centres_px: Float[np.ndarray, "windows 2"]) -> np.ndarray:
+    """Windows that see the back wall at least `_WALL_MARGIN` of its size from its edges."""
+    lens = pinhole(scene.views[view].camera)
+    direction = np.asarray(jax.vmap(lens.direction)(jnp.asarray(centres_px, jnp.float32)), float)
+    origin = np.asarray(scene.views[view].camera.position_m)
+    forward = np.where(direction[:, 1] > 1e-6, direction[:, 1], np.inf)
+    reach = (scene.room.upper_m[1] - origin[1]) / forward
+    point = origin + reach[:, None] * direction
+    seen = np.isfinite(forward)
+    for a in (0, 2):
+        margin = _WALL_MARGIN * scene.room.size_m[a]
+        seen &= (point[:, a] > scene.room.lower_m[a] + margin) & (
+            point[:, a] < scene.room.upper_m[a] - margin
+        )
+    return seen
+
+
+class Prediction(eqx.Module):
+    """A room on its vertices, as measurements see it; `outflow_excess_k` is the mean over the outlets."""
+
+    excess_k: Float[np.ndarray, "vx vy vz"]
+    pressure_m2_s2: Float[np.ndarray, "vx vy vz"]
+    velocity_m_s: Float[np.ndarray, "vx vy vz 3"]
+    outflow_excess_k: float
+
+
+class Observations(eqx.Module):
+    """All data of a problem as one vector with a noise variance each; `group` names where each came from."""
+
+    scene: Scene = eqx.field(static=True)
+    shifts: tuple[ShiftBlocks, ...]
+    planes: tuple[PlaneData, ...]
+    sensors: tuple[SensorData, ...]
+    outlets: tuple[Outlet, ...] = eqx.field(static=True)
+    vertices: tuple[int, int, int] = eqx.field(static=True)
+
+    def values(
+        self,
+    ) -> tuple[Float[np.ndarray, " data"], Float[np.ndarray, " data"], Int[np.ndarray, " data"]]:
+        """Data, variances and groups (0 shifts, 1 planes, 2 sensors' T, 3 sensors' u, 4 outlet)."""
+        parts = [(b.displacement_px.ravel(), b.variance_px2.ravel(), 0) for b in self.shifts]
+        ambient = self.scene.air.ambient_temperature_k
+        parts += [(_plane_pool(p, p.temperature_k - ambient, self.scene), 1e-6, 1) for p in self.planes]
+        for s in self.sensors:
+            t, u = np.isfinite(s.temperature_k), np.isfinite(s.velocity_m_s)
+            std = np.broadcast_to(s.velocity_std_m_s[:, None], u.shape)
+            parts.append((s.temperature_k[t] - ambient, s.temperature_std_k[t] ** 2, 2))
+            parts.append((s.velocity_m_s[u], std[u] ** 2, 3))
+        for o in self.outlets:
+            parts.append((np.array([(o.mean_temperature_k or ambient) - ambient]), o.temperature_std_k**2, 4))
+        values = np.concatenate([np.asarray(v, float).ravel() for v, _, _ in parts] or [np.zeros(0)])
+        variance = np.concatenate(
+            [np.broadcast_to(s, np.shape(v)).ravel() for v, s, _ in parts] or [np.zeros(0)]
+        )
+        group = np.concatenate([np.full(np.size(v), g) for v, _, g in parts] or [np.zeros(0)]).astype(int)
+        return values, variance, group
+
+    def predicted(self, room: Prediction) -> Float[np.ndarray, " data"]:
+        """What this room would have shown, in the order of `values`."""
+        refractivity = self.scene.air.excess_refractivity(jnp.asarray(room.excess_k, jnp.float32))
+        parts = [b.predicted(refractivity).ravel() for b in self.shifts]
+        parts.append(self.plane_values(room.excess_k))
+        for s in self.sensors:
+            t, u = np.isfinite(s.temperature_k), np.isfinite(s.velocity_m_s)
+            parts.append(sample(room.excess_k, s.position_m, self.scene.room)[t])
+            parts.append(sample(room.velocity_m_s, s.position_m, self.scene.room)[u])
+        parts += [np.array([room.outflow_excess_k]) for _ in self.outlets]
+        return np.concatenate([np.asarray(p, float).ravel() for p in parts] or [np.zeros(0)])
+
+    def plane_values(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " blocks"]:
+        """The planes' pooled temperatures in a room."""
+        return np.concatenate([np.zeros(0), *self._plane_parts(excess_k)])
+
+    def plane_blocks(self) -> list[int]:
+        """How many blocks each plane is pooled into."""
+        return [len(part) for part in self._plane_parts(np.zeros((2, 2, 2)))]
+
+    def _plane_parts(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> list[Float[np.ndarray, " blocks"]]:
+        parts = []
+        for plane in self.planes:
+            end = 0 if plane.wall.endswith("min") else -1
+            wall = np.take(excess_k, end, axis=WALLS.index(plane.wall) // 2)
+            parts.append(_plane_pool(plane, _on_plane(wall, plane, self.scene.room), self.scene))
+        return parts
+
+
+def observations(problem: Problem, vertices: tuple[int, int, int]) -> Observations:
+    """Pool a problem's measurements for rooms on `vertices`."""
+    scene = problem.scene
+    blocks = [shift_blocks(scene, n, shift, vertices) for n, shift in enumerate(problem.shifts)]
+    outlets = [b for b in scene.boundary if isinstance(b, Outlet) and b.mean_temperature_k is not None]
+    return Observations(
+        scene,
+        tuple(b for b in blocks if b is not None),
+        problem.planes,
+        problem.sensors,
+        tuple(outlets[:1]),
+        vertices,
+    )
+
+
+def sample(
+    field: Float[np.ndarray, "vx vy vz ..."], points_m: Float[np.ndarray, "points 3"], room: Box
+) -> Float[np.ndarray, "points ..."]:
+    """Trilinear values of a vertex field at points; points outside take the wall's."""
+    axes = [np.linspace(room.lower_m[a], room.upper_m[a], field.shape[a]) for a in AXES]
+    clipped = np.clip(points_m, room.lower_m, room.upper_m)
+    return RegularGridInterpolator(axes, np.asarray(field, float))(clipped)
+
+
+def _on_plane(
+    wall: Float[np.ndarray, "first second"], plane: PlaneData, room: Box
+) -> Float[np.ndarray, "rows cols"]:
+    """A wall's vertex values at the plane's own vertices."""
+    first, second = (a for a in AXES if a != WALLS.index(plane.wall) // 2)
+    for axis, points, at in ((first, plane.first_m, 0), (second, plane.second_m, 1)):
+        nodes = np.linspace(room.lower_m[axis], room.upper_m[axis], wall.shape[at])
+        wall = np.moveaxis(np.tensordot(linear_matrix(nodes, points), wall, axes=(1, at)), 0, at)
+    return wall
+
+
+def _plane_pool(
+    plane: PlaneData, values: Float[np.ndarray, "rows cols"], scene: Scene
+) -> Float[np.ndarray, " blocks"]:
+    """Means over 6 x 12 blocks of the plane, openings left out: a profile with a little breadth."""
+    still = still_vertices(plane)
+    rows, cols = (
+        np.minimum((np.arange(n) * m) // n, m - 1) for n, m in zip(values.shape, (6, 12), strict=True)
+    )
+    key = rows[:, None] * 12 + cols[None, :]
+    count = np.bincount(key[still], minlength=72)
+    total = np.bincount(key[still], weights=values[still], minlength=72)
+    return total[count > 0] / count[count > 0]

@@ -1,0 +1,59 @@
+"""One step of a room's fit: where parameters go next by the misfit of a march, and what that march taught."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from core.estimate.forward_runs import Attempt
+from core.estimate.least_squares import Posterior, gauss_newton, weighted_variance
+from core.estimate.observation import Observations
+from core.estimate.prior import Prior
+
+Vector = Float[np.ndarray, " active"]
+Jacobian = Float[np.ndarray, "data active"]
+
+
+def corrected(
+    vector: Vector,
+    best: Attempt,
+    data: Observations,
+    jacobian: Jacobian,
+    grid_difference: Float[np.ndarray, " data"],
+    *,
+    firm: Bool[np.ndarray, " active"],
+    offset: Float[np.ndarray, " data"] | float = 0.0,
+    trusting: bool = False,
+    reach: float | None = None,
+) -> Posterior:
+    """One Gauss-Newton step from `vector` by the misfit of `best`, `offset` added to what it shows.
+
+    One that may not reach farther than `reach` is a search's, still far from the truth.
+    """
+    values, variance, group = data.values()
+    residual = values - data.predicted(best.seen) - offset
+    weights = weighted_variance(variance, group, residual, grid_difference, far=reach is not None)
+    return gauss_newton(vector, residual, weights, jacobian, firm, trusting=trusting, reach=reach)
+
+
+def misfit_ratio(
+    data: Observations, new: Attempt, old: Attempt, offset: Float[np.ndarray, " data"] | float = 0.0
+) -> float:
+    """Rms misfit of one attempt over another's, each kind of data weighted by the old one's."""
+    values, variance, group = data.values()
+    after, before = (values - data.predicted(a.seen) - offset for a in (new, old))
+    weights = weighted_variance(variance, group, before, before)
+    return float(np.sqrt(np.sum(after**2 / weights) / max(np.sum(before**2 / weights), 1e-30)))
+
+
+def farthest(one: Vector, other: Vector) -> float:
+    """The largest difference of two sets of parameters, in prior deviations."""
+    return float(np.abs(one - other).max(initial=0.0))
+
+
+def fitted(prior: Prior, vector: Vector) -> dict[str, float]:
+    """Parameters by name, in deviations from their priors."""
+    return dict(zip(prior.names(), (float(v) for v in vector), strict=True))
+
+
+def secant(jacobian: Jacobian, moved: Vector, change: Float[np.ndarray, " data"]) -> Jacobian:
+    """The Jacobian that agrees with what a move did, as near to the old one as can be (Broyden 1965)."""
+    return jacobian + np.outer(change - jacobian @ moved, moved) / max(float(moved @ moved), 1e-12)

@@ -1,0 +1,155 @@
+"""What a fitted room says: T, p and u with the last correction, their deviations, and sentences."""
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float
+from scipy.integrate import cumulative_trapezoid
+
+from core.air import GRAVITY_M_S2
+from core.estimate.diagnostics import balances, contradictions, misfit, undetermined
+from core.estimate.forward_runs import Attempt, Derivatives
+from core.estimate.least_squares import Posterior
+from core.estimate.observation import IMAGES, Observations, Prediction
+from core.estimate.prior import Prior
+from core.estimate.temperature_nudging import departure, free_vertices, last_correction, layer_means, unheld
+from core.estimate.uncertainty import Deviation, Represented, deviation
+from core.problem import Problem
+from core.result import Solution
+from core.room.boundary_conditions import RoomLayout
+
+# Taken for the share of the images that is left unexplained where there are none.
+_UNSEEN_SHARE = 0.3
+# What grid, closure and scale leave open (a, c and b of `core.estimate.uncertainty`).
+_SHARES = {"excess_k": (0.1, 0.3, 1.0), "pressure_m2_s2": (0.3, 1.0, 1.0), "velocity_m_s": (0.2, 5.0, 0.3)}
+# A level that thermometers moved is doubted by half of that: they stand in a few places, of which the room was wrong.
+_DOUBT = 0.5
+# Of c, where one guessed viscosity stands for all air: images that a map of it explains do not make it the right one.
+_GUESSED_VISCOSITY = {"excess_k": 20.0, "pressure_m2_s2": 1.0, "velocity_m_s": 2.0}
+
+
+class Solved(eqx.Module):
+    """Everything that a solve leaves behind: what a solution and its deviations are made of.
+
+    `coarse`, `first` (the fine room) and `other` (another closure) share their parameters. `before` is the room
+    that fitted parameters alone make, `best` the same with its level, or profile, held.
+    """
+
+    problem: Problem
+    data: Observations
+    prior: Prior
+    posterior: Posterior
+    derivatives: Derivatives
+    coarse: Prediction
+    first: Prediction
+    other: Prediction
+    before: Attempt
+    best: Attempt
+    layout: RoomLayout
+
+
+def solution(solved: Solved, seconds: float, *, use_images: bool, notes: tuple[str, ...] = ()) -> Solution:
+    """The room as a result, with the temperature's last correction, deviations and sentences after `notes`."""
+    best, box, problem = solved.best, solved.problem.scene.room, solved.problem
+    local_k = departure(best.seen.excess_k)
+    free = free_vertices(solved.layout, best.seen.excess_k.shape)
+    start = unheld(best.seen, solved.before.seen, solved.data, solved.prior, free)
+    change = last_correction(solved.data, solved.prior, solved.derivatives, start)
+    x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(start.excess_k.shape))
+    excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
+    moved_k = float(layer_means(excess - solved.before.seen.excess_k).mean())
+    before, after = (
+        (v[:, None, :] + (_DOUBT * moved_k) ** 2) * free
+        for v in (change.prior_variance_k2, change.variance_k2)
+    )
+    bent = bent_m4_s4(problem, z, before), bent_m4_s4(problem, z, after)
+    share = unexplained(solved.data, best.seen)
+    temperature = _deviation(solved, "excess_k", local_k, share, (before, after))
+    pressure = _deviation(solved, "pressure_m2_s2", departure(best.seen.pressure_m2_s2), share, bent)
+    velocity = _deviation(solved, "velocity_m_s", rms(best.seen.velocity_m_s), share)
+    return Solution(
+        x,
+        y,
+        z,
+        problem.scene.air.ambient_temperature_k + excess,
+        best.seen.pressure_m2_s2 + carried_m2_s2(problem, z, excess - best.seen.excess_k),
+        best.seen.velocity_m_s,
+        temperature.std,
+        pressure.std,
+        velocity.std,
+        temperature.informed,
+        outcome=best.flow.outcome,
+        solver_s=seconds,
+        notes=(*notes, *sentences(solved, share)),
+    )
+
+
+def sentences(solved: Solved, share: float) -> list[str]:
+    """Everything worth telling the operator; `share` of the images is left unexplained."""
+    parameters = solved.best.parameters
+    inflow = np.asarray(solved.layout.inflow_m3_s(parameters), float)
+    return [
+        *solved.layout.notes,
+        *undetermined(solved.problem),
+        *contradictions(solved.problem, solved.prior, solved.posterior),
+        *misfit(solved.data, share),
+        *balances(parameters, inflow, solved.best.seen.outflow_excess_k, solved.problem, held_k_m3_s(solved)),
+    ]
+
+
+def held_k_m3_s(solved: Solved) -> float:
+    """What it took to hold the temperatures that measurements say, over the whole room."""
+    box = solved.problem.scene.room
+    return (solved.best.flow.held_k_s or 0.0) * float(np.prod(box.size_m))
+
+
+def unexplained(data: Observations, seen: Prediction) -> float:
+    """Share (rms) of the measured shifts that a room does not explain."""
+    values, _, group = data.values()
+    shifts = group == IMAGES
+    if not shifts.any():
+        return _UNSEEN_SHARE
+    left = (values - data.predicted(seen))[shifts]
+    return float(np.linalg.norm(left) / max(float(np.linalg.norm(values[shifts])), 1e-30))
+
+
+def carried_m2_s2(
+    problem: Problem, z_m: Float[np.ndarray, " vz"], warmer_k: Float[np.ndarray, "vx vy vz"]
+) -> Float[np.ndarray, " vz"]:
+    """Pressure over height that carries air which is warmer by this: dp/dz = g beta dT, its mean at each height."""
+    buoyancy = GRAVITY_M_S2 * problem.scene.air.expansion_per_k * warmer_k.mean((0, 1))
+    return cumulative_trapezoid(buoyancy, z_m, initial=0.0)
+
+
+def bent_m4_s4(
+    problem: Problem, z_m: Float[np.ndarray, " vz"], variance_k2: Float[np.ndarray, "vx vy vz"]
+) -> Float[np.ndarray, "vx vy vz"]:
+    """Variance of p about its mean where the air at all heights is too warm together, with this variance."""
+    carried = carried_m2_s2(problem, z_m, np.sqrt(variance_k2))
+    return np.broadcast_to(np.square(carried - carried.mean()), variance_k2.shape)
+
+
+def rms(field: Float[np.ndarray, "..."]) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(field))))
+
+
+def _deviation(
+    solved: Solved,
+    name: str,
+    scale: float,
+    share: float,
+    extra: tuple[np.ndarray | float, np.ndarray | float] = (0.0, 0.0),
+) -> Deviation:
+    moved = list(solved.derivatives.per_deviation(lambda run: getattr(run, name)))
+    between = [getattr(run, name) - getattr(solved.coarse, name) for run in (solved.first, solved.other)]
+    if between[1].ndim == 3:
+        # Closures pass walls' heat differently; the level that follows is measured.
+        between[1] = between[1] - between[1].mean((0, 1))
+        if solved.data.planes:
+            # The profile of height is measured by the plane; only departures from it are the grid's.
+            between[0] = between[0] - between[0].mean((0, 1))
+    a, c, b = _SHARES[name]
+    if float(solved.prior.std.log_viscosity.max()) > 0:
+        c *= _GUESSED_VISCOSITY[name]
+    represented = Represented(between[0], between[1], scale, (a, c * share, b * share))
+    return deviation(moved, solved.posterior.covariance, represented, extra)

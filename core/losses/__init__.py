@@ -1,0 +1,1 @@
+"""The losses of a reconstruction: data, boundary, equations, smoothness."""

@@ -1,0 +1,246 @@
+"""What a scene knows at its boundary, as rows for the boundary loss.
+
+Each field is divided by the largest value that is known of it (paper, section II-D), with the scales'
+floors where that would be zero; one scale for the whole velocity vector.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from core.geometry import WallName
+from core.grid.interpolation import interpolation_matrix
+from core.losses.boussinesq import Flow
+from core.losses.physics import BoundaryLoss, MeanLoss, Patch, PointLoss
+from core.losses.representation import Span, Spans, points_of, positions
+from core.problem import PlaneData, Problem, SensorData
+from core.scene import Heater, Inlet, Outlet, Wall
+from core.scene import Patch as WallPatch
+from core.setting import SettingError
+from core.solve.nondimensional import Frame, measured_outlets
+
+# A reading that is one standard deviation off weighs this much against the losses, which are means of squares.
+_READING = 0.01
+# Where no plane or sensor is known an outlet alone fixes the level of T: ten times as much.
+_ONLY_READING = 0.1
+
+
+def boundary_loss(problem: Problem, frame: Frame, *, weight: float, points_an_axis: int) -> BoundaryLoss:
+    """Rows of planes, inlets, outlets, heaters and walls, on `points_an_axis` points along each wall axis.
+
+    The edges of a patch are as sharp as those points. Later entries do not override earlier ones: where a
+    wall holds a patch, the wall's own condition is left out.
+    """
+    patches = [_plane(plane, frame, points_an_axis) for plane in problem.planes]
+    known = {plane.wall for plane in problem.planes}
+    items = problem.scene.boundary
+    held = [item.patch for item in items if isinstance(item, Inlet | Outlet | Heater)]
+    for item in items:
+        match item:
+            case Wall() if item.wall not in known:
+                own = [h for h in held if h.wall == item.wall]
+                patches += _wall(item, own, frame, points_an_axis, resolved=_resolves_layers(problem))
+            case Inlet() | Outlet() | Heater() if item.patch.wall not in known:
+                patches.append(_patch(item, frame, points_an_axis))
+            case _:
+                pass  # plane fields and sensors come as data in the problem
+    return BoundaryLoss(tuple(patches), weight)
+
+
+def point_losses(problem: Problem, frame: Frame) -> tuple[PointLoss, ...]:
+    """Sensors, and one weak row that fixes the constant of p where nothing else does."""
+    losses = [_sensors(sensor, frame) for sensor in problem.sensors]
+    knows_p = bool(problem.planes) or any(isinstance(item, Outlet) for item in problem.scene.boundary)
+    if not knows_p:
+        centre = jnp.asarray(
+            [[(a + b) / 2 for a, b in zip(frame.lower, frame.upper, strict=True)]], jnp.float32
+        )
+        weight = Flow(jnp.zeros(1), jnp.full(1, 0.01), jnp.zeros((1, 3)))
+        losses.append(PointLoss(centre, _zeros((1,)), weight, name="gauge"))
+    return tuple(losses)
+
+
+def level_loss(problem: Problem, frame: Frame, points_an_axis: int) -> MeanLoss | None:
+    """The outlets' mean temperatures on walls whose plane is not known; None where there are none."""
+    known = {plane.wall for plane in problem.planes}
+    outlets = [found for found in measured_outlets(problem) if found[0].patch.wall not in known]
+    if not outlets:
+        return None
+    say = _READING if problem.planes or problem.sensors else _ONLY_READING
+    points, target, weight = [], [], []
+    for outlet, kelvin in outlets:
+        spans, axes = _wall_spans(outlet.patch.wall, frame, points_an_axis)
+        spans = _inwards(spans, outlet.patch.wall, frame, points_an_axis)
+        inside = _inside(outlet.patch, spans, axes, frame).ravel()
+        points.append(jnp.asarray(points_of(spans)[inside], jnp.float32))
+        target.append((kelvin - frame.scales.reference_k) / frame.scales.excess_k)
+        weight.append(say * abs(frame.scales.excess_k) / outlet.temperature_std_k)
+    return MeanLoss(tuple(points), jnp.array(target, jnp.float32), jnp.array(weight, jnp.float32))
+
+
+def _inwards(spans: Spans, wall: WallName, frame: Frame, n: int) -> Spans:
+    """Half a cell of the grid inside: air that leaves has no layer, and nothing else holds a grid's ghosts."""
+    axis = "xyz".index(wall[0])
+    step = (frame.upper[axis] - frame.lower[axis]) / (n - 1) * (1 if wall.endswith("min") else -1)
+    moved = list(spans)
+    moved[axis] = (spans[axis][0] + step, spans[axis][0] + step, 1)
+    return _triple(moved)
+
+
+def _plane(plane: PlaneData, frame: Frame, n: int) -> Patch:
+    spans, axes = _wall_spans(plane.wall, frame, n)
+    room, (first, second) = frame.room, axes
+    shape = tuple(span[2] for span in spans)
+
+    def resampled(values: Float[np.ndarray, "first second"]) -> np.ndarray:
+        targets = [room.lower_m[a] + frame.scales.length_m * positions(spans[a]) for a in (first, second)]
+        along = interpolation_matrix(np.asarray(plane.first_m, float), targets[0])
+        across = interpolation_matrix(np.asarray(plane.second_m, float), targets[1])
+        return (along @ values @ across.T).reshape(shape)
+
+    velocity = np.stack([resampled(plane.velocity_m_s[..., c]) for c in range(3)], axis=-1)
+    target = frame.scales.to_nd(
+        jnp.asarray(resampled(plane.temperature_k), jnp.float32),
+        jnp.asarray(resampled(plane.pressure_m2_s2), jnp.float32),
+        jnp.asarray(velocity, jnp.float32),
+    )
+    # One over the largest value, at least a tenth of the field's scale.
+    largest = [
+        max(float(jnp.abs(v).max()), 0.1) for v in (target.temperature, target.pressure, target.velocity)
+    ]
+    return Patch(spans, target, _constant(shape, 1 / largest[0], 1 / largest[1], 1 / largest[2]))
+
+
+def _resolves_layers(problem: Problem) -> bool:
+    """Whether the model's transport is the air's own up to the walls.
+
+    With the effective transport of a mean flow the thermal layer at a wall is thinner than a cell: the
+    wall's temperature is not that of the air beside it, and would drag the whole room along.
+    """
+    return problem.scene.flow.transport in ("molecular", "given")
+
+
+def _wall(wall: Wall, held: list[WallPatch], frame: Frame, n: int, *, resolved: bool) -> list[Patch]:
+    spans, axes = _wall_spans(wall.wall, frame, n)
+    shape = tuple(span[2] for span in spans)
+    free = ~np.any([_inside(h, spans, axes, frame) for h in held], axis=0) if held else np.ones(shape, bool)
+    kelvin = wall.temperature_k if wall.temperature_k is not None else frame.scales.reference_k
+    target = _values(shape, frame, temperature_k=kelvin)
+    weight = _masked(
+        free,
+        temperature=float(resolved and wall.thermal == "temperature"),
+        pressure=0.0,
+        velocity=float(wall.no_slip),
+    )
+    patches = [Patch(spans, target, weight)]
+    if wall.thermal == "adiabatic":
+        patches.append(_insulated(wall.wall, spans, free, frame, n))
+    return patches
+
+
+def _insulated(wall: WallName, spans: Spans, free: np.ndarray, frame: Frame, n: int) -> Patch:
+    """No heat through the wall: the temperatures half a spacing inside and outside are equal."""
+    axis = "xyz".index(wall[0])
+    step = (frame.upper[axis] - frame.lower[axis]) / (n - 1)  # half a cell on either side: see `solve_grid`
+    place = spans[axis][0]
+    before, after = list(spans), list(spans)
+    before[axis], after[axis] = (place - step, place - step, 1), (place + step, place + step, 1)
+    weight = _masked(free, temperature=1.0, pressure=0.0, velocity=0.0)
+    return Patch(_triple(after), _zeros(free.shape), weight, minus=_triple(before))
+
+
+def _patch(item: Inlet | Outlet | Heater, frame: Frame, n: int) -> Patch:
+    spans, axes = _wall_spans(item.patch.wall, frame, n)
+    shape = tuple(span[2] for span in spans)
+    inside = _inside(item.patch, spans, axes, frame)
+    if not inside.any():
+        raise _nothing_inside(item, n)
+    match item:
+        case Inlet():
+            target = _values(shape, frame, item.temperature_k, item.velocity_m_s)
+            weight = _masked(inside, temperature=1.0, pressure=0.0, velocity=1.0)
+        case Heater():
+            target = _values(shape, frame, item.temperature_k)
+            weight = _masked(inside, temperature=1.0, pressure=0.0, velocity=1.0)
+        case Outlet():
+            # The patch's mean temperature is a row of its own: it is not each point's.
+            target = _values(shape, frame, frame.scales.reference_k)
+            weight = _masked(inside, temperature=0.0, pressure=1.0, velocity=0.0)
+    return Patch(spans, target, weight)
+
+
+def _nothing_inside(item: Inlet | Outlet | Heater, n: int) -> SettingError:
+    patch = item.patch
+    return SettingError(
+        f"The {item.kind} on {patch.wall} from {patch.lower_m} to {patch.upper_m} m holds none of "
+        f"{n} points along each axis of its wall. Check the patch, or take a finer grid."
+    )
+
+
+def _sensors(sensor: SensorData, frame: Frame) -> PointLoss:
+    points = (sensor.position_m - np.array(frame.room.lower_m)) / frame.scales.length_m
+    t_known, u_known = np.isfinite(sensor.temperature_k), np.isfinite(sensor.velocity_m_s)
+    target = frame.scales.to_nd(
+        jnp.asarray(np.where(t_known, sensor.temperature_k, frame.scales.reference_k), jnp.float32),
+        jnp.zeros(len(points)),
+        jnp.asarray(np.where(u_known, sensor.velocity_m_s, 0.0), jnp.float32),
+    )
+    t_weight = np.where(t_known, _READING * abs(frame.scales.excess_k) / sensor.temperature_std_k, 0.0)
+    u_std = np.where(np.isfinite(sensor.velocity_std_m_s), sensor.velocity_std_m_s, 1.0)[:, None]
+    u_weight = np.where(u_known, _READING * frame.scales.velocity_m_s / u_std, 0.0)
+    weight = Flow(
+        jnp.asarray(np.nan_to_num(t_weight), jnp.float32),
+        jnp.zeros(len(points)),
+        jnp.asarray(u_weight, jnp.float32),
+    )
+    return PointLoss(jnp.asarray(points, jnp.float32), target, weight)
+
+
+def _wall_spans(wall: str, frame: Frame, n: int) -> tuple[Spans, tuple[int, int]]:
+    """The wall's points, and its two axes."""
+    axis = "xyz".index(wall[0])
+    corner = frame.lower if wall.endswith("min") else frame.upper
+    spans: list[Span] = [(low, high, n) for low, high in zip(frame.lower, frame.upper, strict=True)]
+    spans[axis] = (corner[axis], corner[axis], 1)
+    first, second = (a for a in range(3) if a != axis)
+    return _triple(spans), (first, second)
+
+
+def _triple(spans: list[Span]) -> Spans:
+    x, y, z = spans
+    return x, y, z
+
+
+def _inside(patch: WallPatch, spans: Spans, axes: tuple[int, int], frame: Frame) -> np.ndarray:
+    inside = np.ones(tuple(span[2] for span in spans), bool)
+    for axis, low, high in zip(axes, patch.lower_m, patch.upper_m, strict=True):
+        metres = frame.room.lower_m[axis] + frame.scales.length_m * positions(spans[axis])
+        along = (metres > low) & (metres < high)
+        inside &= along.reshape([-1 if a == axis else 1 for a in range(3)])
+    return inside
+
+
+def _values(
+    shape: tuple[int, ...], frame: Frame, temperature_k: float, velocity_m_s: tuple = (0.0, 0.0, 0.0)
+) -> Flow:
+    flow = frame.scales.to_nd(
+        jnp.full(shape, temperature_k, jnp.float32),
+        jnp.zeros(shape),
+        jnp.broadcast_to(jnp.asarray(velocity_m_s, jnp.float32), (*shape, 3)),
+    )
+    return flow
+
+
+def _masked(mask: np.ndarray, *, temperature: float, pressure: float, velocity: float) -> Flow:
+    on = jnp.asarray(mask, jnp.float32)
+    return Flow(
+        temperature * on, pressure * on, jnp.broadcast_to((velocity * on)[..., None], (*mask.shape, 3))
+    )
+
+
+def _constant(shape: tuple[int, ...], temperature: float, pressure: float, velocity: float) -> Flow:
+    return _masked(np.ones(shape, bool), temperature=temperature, pressure=pressure, velocity=velocity)
+
+
+def _zeros(shape: tuple[int, ...]) -> Flow:
+    return Flow(jnp.zeros(shape), jnp.zeros(shape), jnp.zeros((*shape, 3)))

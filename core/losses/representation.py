@@ -1,0 +1,67 @@
+"""What a loss may ask of a representation of (T, p, u), and the unknowns that are solved for.
+
+A representation does not know which losses there are; a loss does not know what it is evaluated on.
+"""
+
+from typing import Protocol, runtime_checkable
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Float
+
+from core.losses.boussinesq import Flow, Numbers, Residuals
+
+Span = tuple[float, float, int]
+Spans = tuple[Span, Span, Span]
+
+
+@runtime_checkable
+class Fields(Protocol):
+    """T, p, u in nondimensional coordinates, evaluated."""
+
+    def at(self, points_nd: Float[Array, "points 3"]) -> Flow:
+        """Values at scattered points."""
+        ...
+
+    def on_grid(self, spans: Spans) -> Flow:
+        """Values on a tensor grid of points: first, last and number along x, y, z."""
+        ...
+
+    def residuals(self, numbers: Numbers, points_nd: Float[Array, "points 3"] | None) -> Residuals:
+        """What the equations leave: at the points, or of every cell for a grid, which ignores them."""
+        ...
+
+
+@runtime_checkable
+class Representation(Protocol):
+    """Parameters that make fields."""
+
+    def fields(self) -> Fields:
+        """The fields of these parameters; what several losses share is computed here once."""
+        ...
+
+
+class Unknowns(eqx.Module):
+    """A representation, and what the measurement did not keep still.
+
+    `drift_px`: a similarity of each view's pattern in the picture (camera and projector together; they
+    are the same four numbers to first order when the wall is seen face-on): move along columns and
+    rows, rotation and magnification, each as the largest displacement in px that it causes.
+    `log_transport`: logarithms of learned factors on viscosity and diffusivity.
+    None where a scene does not ask for it.
+    """
+
+    representation: Representation
+    drift_px: Float[Array, "views 4"] | None = None
+    log_transport: Float[Array, "2"] | None = None
+
+
+def positions(span: Span) -> Float[np.ndarray, " n"]:
+    """The coordinates of a span."""
+    return np.linspace(*span)
+
+
+def points_of(spans: Spans) -> Float[np.ndarray, "points 3"]:
+    """All points of a tensor grid, x slowest."""
+    mesh = np.meshgrid(*(positions(span) for span in spans), indexing="ij")
+    return np.stack([m.ravel() for m in mesh], axis=1)

@@ -1,0 +1,103 @@
+"""What one view cannot see: the spectrum of the straight-ray operator against the noise.
+
+On a coarse vertex grid the excess temperature has a smooth Gaussian prior with covariance L L^T. The
+singular values s of  W^1/2 A L  say how far each mode stands out of the noise; s > 1 is seen. The share
+of the prior's variance that a set of measurements removes is  1 - tr(posterior) / tr(prior).
+Cost: one dense singular value decomposition of some 600 unknowns.
+"""
+
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from core.known import VertexGrid, known_temperature
+from core.plan.expected import ExpectedFlow
+from core.plan.signal import Signal
+from core.problem import Problem
+from core.rays.operator import build
+
+_SHAPE = (11, 7, 10)
+# Correlation length of the prior, in parts of each edge of the room.
+_LENGTH = 0.15
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Modes of the temperature that stand out of the noise, and shares of variance that are found."""
+
+    modes: int
+    modes_seen: int
+    images: float
+    boundary: float
+    both: float
+    singular_values: Float[np.ndarray, " modes"]
+
+
+def seen(problem: Problem, flow: ExpectedFlow, signals: tuple[Signal, ...]) -> Seen:
+    """How much of an unknown temperature of the expected size the images and the boundary determine."""
+    scene = problem.scene
+    grid = VertexGrid(scene.room, _SHAPE)
+    departure = flow.excess_k - flow.excess_k.mean(axis=(0, 1))
+    root = _prior_root(grid) * max(float(departure.std()), 1e-9)
+    size = len(root)
+    per_k = scene.air.ambient_refractivity / scene.air.ambient_temperature_k
+    rows = []
+    for view, found in enumerate(signals):
+        operator = build(scene, view, found.shift.centres_px, _SHAPE, float(found.noise.window_px))
+        matrix = np.asarray(_columns(operator, size))
+        whitened = matrix.transpose(1, 2, 0) / np.array(found.noise.std_px)[None, :, None]
+        rows.append(whitened.reshape(-1, size) * (-per_k * found.shift.stride))
+    images = np.concatenate(rows) @ root
+    known = _known_rows(problem, grid) @ root
+    values = np.linalg.svd(images, compute_uv=False)
+    return Seen(
+        size,
+        int(np.sum(values > 1.0)),
+        _share(images, root),
+        _share(known, root),
+        _share(np.concatenate([images, known]), root),
+        values,
+    )
+
+
+def _columns(operator, size: int):
+    """Displacements by a unit at each vertex."""
+    import jax
+
+    basis = jnp.eye(size, dtype=jnp.float32).reshape(size, *_SHAPE)
+    return jax.lax.map(operator.apply, basis)
+
+
+def _prior_root(grid: VertexGrid) -> Float[np.ndarray, "size size"]:
+    """L with L L^T the separable Gaussian covariance of unit variance."""
+    factors = []
+    for n in grid.shape:
+        apart = np.subtract.outer(np.linspace(0, 1, n), np.linspace(0, 1, n))
+        covariance = np.exp(-0.5 * (apart / _LENGTH) ** 2) + 1e-6 * np.eye(n)
+        factors.append(np.linalg.cholesky(covariance))
+    return np.kron(np.kron(factors[0], factors[1]), factors[2])
+
+
+def _known_rows(problem: Problem, grid: VertexGrid) -> Float[np.ndarray, "known size"]:
+    """Rows of what is known of the temperature, each over its standard deviation."""
+    known = known_temperature(problem, grid)
+    mask = known.mask.ravel()
+    rows = [np.eye(len(mask))[mask] / known.std_k.ravel()[mask][:, None]]
+    for members, _, std in known.means:
+        row = np.zeros((1, len(mask)))
+        row[0, members] = 1.0 / (len(members) * std)
+        rows.append(row)
+    return np.concatenate(rows)
+
+
+def _share(rows: np.ndarray, root: np.ndarray) -> float:
+    """Share of the prior's variance that measurements with these whitened rows remove."""
+    if not len(rows):
+        return 0.0
+    _, values, modes = np.linalg.svd(rows, full_matrices=False)
+    removed = values**2 / (1.0 + values**2)
+    # Variance in space, not in the whitened space: modes are weighed by what they carry.
+    carried = np.sum((root @ modes.T) ** 2, axis=0)
+    return float(np.sum(removed * carried) / np.sum(root**2))

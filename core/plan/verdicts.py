@@ -1,0 +1,89 @@
+"""Verdicts in words: what this rig can see, and what would help where it cannot."""
+
+import numpy as np
+
+from core.plan.choice import Choice
+from core.plan.expected import ExpectedFlow
+from core.plan.observability import Seen
+from core.plan.signal import VISIBLE, Signal, lever_m
+from core.scene import ProjectedPattern, Scene
+
+_SAME_PLACE_M = 0.01
+
+
+def verdict(scene: Scene, view: int, flow: ExpectedFlow, found: Signal, other_p99_px: float) -> str:
+    """One view's sentence: visible or not, and what it would need."""
+    name, frames = scene.views[view].name, scene.views[view].frames
+    size = found.shift.percentile_px(99)
+    if not np.isfinite(found.noise.mean_px):
+        return f"{name}: the wall shows no pattern that this camera resolves; nothing can be measured."
+    if size == 0 and _same_place(scene, view):
+        return (
+            f"{name}: camera and projector stand in one place and see exactly no shift. "
+            "Move the projector at least 1 m away, or print the pattern."
+        )
+    seen = (
+        f"{name}: the pattern would move by {size:.2g} px (99th percentile), {found.snr:.2g} times the noise of a "
+        f"window ({found.noise.mean_px:.2g} px from {frames} frames)"
+    )
+    if found.snr >= VISIBLE:
+        return f"{seen}. Differences down to {found.smallest_visible_k:.2g} K stand out in one window."
+    return (
+        f"{seen}. This rig cannot see {found.contrast_k:.2g} K in one window: it would need "
+        f"{' or '.join(_remedies(scene, view, flow, found, other_p99_px))}."
+    )
+
+
+def _same_place(scene: Scene, view: int) -> bool:
+    if not isinstance(scene.light, ProjectedPattern):
+        return False
+    apart = np.subtract(scene.light.projector.position_m, scene.views[view].camera.position_m)
+    return float(np.linalg.norm(apart)) < _SAME_PLACE_M
+
+
+def _remedies(scene: Scene, view: int, flow: ExpectedFlow, found: Signal, other_p99_px: float) -> list[str]:
+    """Each alone would make the flow visible."""
+    missing = VISIBLE / max(found.snr, 1e-12)
+    frames = scene.views[view].frames * missing**2
+    # A finer sensor sees a larger shift in pixels, in windows of more pixels.
+    pixels = scene.views[view].camera.width_px * missing**0.5
+    offered = [f"{_rounded_up(frames)} frames"] if frames < 1e6 else []
+    if pixels < 20_000:
+        offered.append(f"a camera of {_rounded_up(pixels)} px across")
+    lever = lever_m(scene, flow) * (missing - 1)
+    if lever < 10:
+        offered.append(f"a wall {lever:.1f} m further behind the flow")
+    if isinstance(scene.light, ProjectedPattern):
+        apart = np.subtract(scene.light.projector.position_m, scene.views[view].camera.position_m)
+        baseline = float(np.linalg.norm(apart)) * missing
+        if baseline < 5:
+            offered.append(f"the projector {baseline:.1f} m from the camera")
+        if other_p99_px >= found.shift.percentile_px(99) * missing:
+            offered.append("a printed pattern on the wall")
+    return offered or ["a flow with larger differences: no reasonable rig sees this one"]
+
+
+def _rounded_up(value: float) -> int:
+    """Two leading digits, upwards."""
+    digits = 10 ** max(0, int(np.floor(np.log10(max(value, 1.0)))) - 1)
+    return int(np.ceil(value / digits) * digits)
+
+
+def blindness(found: Seen) -> str:
+    """What the picture leaves open, and what the boundary adds."""
+    return (
+        f"The images fix {found.modes_seen} of {found.modes} smooth patterns of temperature: "
+        f"{100 * found.images:.0f} % of an unknown flow's variance; what is known at the boundary alone "
+        f"{100 * found.boundary:.0f} %, both {100 * found.both:.0f} %. What varies along the line of sight "
+        "only is in none of the pictures."
+    )
+
+
+def broken(choices: tuple[Choice, ...]) -> list[str]:
+    """Choices whose bound is above the limit even at the dearest setting."""
+    return [
+        f"{c.name} = {c.value}: its bound {c.bound:.2g} {c.unit} is above the limit {c.limit:.2g} {c.unit}; "
+        "expect an error of that size."
+        for c in choices
+        if not c.holds
+    ]

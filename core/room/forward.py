@@ -1,0 +1,166 @@
+"""A room of one grid: parameters in, the marched flow and what measurements would see of it out."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from core.air import GRAVITY_M_S2
+from core.estimate.observation import Prediction
+from core.room.boundary_conditions import RoomLayout, RoomParameters, boundary, room_layout
+from core.room.closure import (
+    AbstractClosure,
+    ConstantClosure,
+    KEpsilonClosure,
+    ZeroEquationClosure,
+    wall_distance_m,
+)
+from core.room.grid import AXES, RoomGrid, Velocity, room_grid
+from core.room.model import Flow, RoomModel, air_at_rest, room_model
+from core.room.openings import opening_edges_m
+from core.room.vertices import (
+    linear_matrix,
+    vertex_excess_k,
+    vertex_pressure_m2_s2,
+    vertex_velocity_m_s,
+)
+from core.scene import Scene
+
+# nu_t = 0.0058 U sqrt(A) is the mean of k-epsilon's over the reference rooms.
+_EDDY_SHARE = 0.0058
+_TURBULENT_PRANDTL = 0.85
+
+
+class Room(eqx.Module):
+    """A scene laid on a grid with a closure; `speed_m_s` is the flow's own scale."""
+
+    scene: Scene = eqx.field(static=True)
+    layout: RoomLayout
+    closure: str = eqx.field(static=True)
+    speed_m_s: float = eqx.field(static=True)
+
+    @property
+    def grid(self) -> RoomGrid:
+        """The cells."""
+        return self.layout.grid
+
+    @property
+    def pace(self) -> float:
+        """How much slower than the reference room (3.3 m at 0.5 m/s) this one turns over, at least 1."""
+        edge_m = float(np.prod(self.scene.room.size_m)) ** (1 / 3)
+        return float(np.clip(edge_m / self.speed_m_s / 6.6, 1.0, 4.0))
+
+    def model(self, parameters: RoomParameters) -> RoomModel:
+        """The solver's model for these parameters."""
+        air = self.scene.air
+        bare = room_model(
+            self.grid,
+            boundary(self.layout, parameters),
+            self._closure(jnp.exp(parameters.log_closure)),
+            buoyancy_m_s2_k=GRAVITY_M_S2 * air.expansion_per_k,
+            molecular_m2_s=air.kinematic_viscosity_m2_s,
+            prandtl=air.prandtl,
+            turbulent_prandtl=_TURBULENT_PRANDTL,
+        )
+        return eqx.tree_at(
+            lambda m: m.log_viscosity, bare, lattice_to_cells(parameters.log_viscosity, self.grid)
+        )
+
+    def at_rest(self, model: RoomModel, profile_k: Float[np.ndarray, " nz"]) -> Flow:
+        """Still air with a temperature of height only."""
+        excess = jnp.asarray(np.broadcast_to(profile_k, self.grid.cells), jnp.float32)
+        return air_at_rest(model, excess, self.speed_m_s)
+
+    def _closure(self, scale: Float[Array, ""]) -> AbstractClosure:
+        molecular = jnp.float32(self.scene.air.kinematic_viscosity_m2_s)
+        flow = self.scene.flow
+        if self.closure == "zero_equation":
+            return ZeroEquationClosure(wall_distance_m(self.grid), scale, molecular)
+        if self.closure == "constant":
+            area = (
+                sum(o.area_m2 for o in self.layout.inlets)
+                or float(np.prod(self.scene.room.size_m)) ** (2 / 3) / 90
+            )
+            eddy = flow.viscosity_m2_s or _EDDY_SHARE * self.speed_m_s * area**0.5
+            return ConstantClosure(scale * eddy, molecular)
+        if self.closure == "molecular":
+            return ConstantClosure(0.0 * scale, molecular)
+        return KEpsilonClosure(scale, molecular)
+
+
+def closure_name(scene: Scene) -> str:
+    """The closure that a scene asks for; `auto` and `learned` start from k-epsilon."""
+    named = {"molecular": "molecular", "given": "constant", "zero_equation": "zero_equation"}
+    return named.get(scene.flow.transport, "k_epsilon")
+
+
+def room(scene: Scene, cells: int, closure: str) -> Room:
+    """Lay `scene` on about cells^3 cells. Raises SettingError for a boundary that cannot be."""
+    layout = room_layout(scene, room_grid(scene.room, cells, opening_edges_m(scene)))
+    speeds = [float(np.linalg.norm(v)) for v in layout.inlet_velocity_m_s]
+    return Room(scene, layout, closure, max([*speeds, _plume_speed_m_s(scene)]))
+
+
+def _plume_speed_m_s(scene: Scene) -> float:
+    """A tenth of the free-fall speed of the largest stated contrast over the room's height."""
+    ambient = scene.air.ambient_temperature_k
+    stated = [getattr(part, "temperature_k", None) for part in scene.boundary]
+    contrast = max([abs(t - ambient) for t in stated if t is not None] + [0.1])
+    return 0.1 * float(np.sqrt(9.81 * contrast / ambient * scene.room.size_m[2]))
+
+
+def lattice_to_cells(lattice: Float[Array, "lx ly lz"], grid: RoomGrid) -> Float[Array, "nx ny nz"]:
+    """A coarse lattice over the room, walls included, to its cells."""
+    field = lattice
+    for a in AXES:
+        nodes = np.linspace(0.0, 1.0, lattice.shape[a])
+        points = (np.arange(grid.cells[a]) + 0.5) / grid.cells[a]
+        field = _apply_matrix(linear_matrix(nodes, points), field, a)
+    return field
+
+
+def carried_over(flow: Flow, source: RoomGrid, target: RoomGrid) -> Flow:
+    """A flow on another grid of the same room, linearly; its divergence goes at the first step."""
+
+    def cells(field: Float[Array, "nx ny nz"], faces: int | None = None) -> Float[Array, "mx my mz"]:
+        for a in AXES:
+            old = source.faces_m(a) if a == faces else source.centres_m(a)
+            new = target.faces_m(a) if a == faces else target.centres_m(a)
+            field = _apply_matrix(linear_matrix(old, new), field, a)
+        return field
+
+    u, v, w = (cells(flow.velocity[a], a) for a in AXES)
+    velocity: Velocity = (u, v, w)
+    turbulence = flow.turbulence
+    if turbulence is not None:
+        turbulence = type(turbulence)(cells(turbulence.energy_m2_s2), cells(turbulence.dissipation_m2_s3))
+    return Flow(velocity, cells(flow.excess_k), cells(flow.pressure_m2_s2), turbulence)
+
+
+def seen(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> Prediction:
+    """The flow on the room's vertices."""
+    excess, pressure, velocity, outflow = _vertices(flow, model, vertices)
+    return Prediction(np.asarray(excess), np.asarray(pressure), np.asarray(velocity), float(outflow))
+
+
+@eqx.filter_jit
+def _vertices(
+    flow: Flow, model: RoomModel, vertices: tuple[int, int, int]
+) -> tuple[Array, Array, Array, Array]:
+    heat, volume = jnp.float32(0.0), jnp.float32(0.0)
+    for a in AXES:
+        for side, wall in enumerate(model.boundary.walls[a]):
+            leaving = jnp.maximum(wall.normal_m_s if side else -wall.normal_m_s, 0.0)
+            beside = jnp.take(flow.excess_k, -1 if side else 0, axis=a)
+            heat, volume = heat + jnp.sum(leaving * beside), volume + jnp.sum(leaving)
+    outflow = heat / jnp.maximum(volume, 1e-12)
+    return (
+        vertex_excess_k(flow, model, vertices),
+        vertex_pressure_m2_s2(flow, model, vertices),
+        vertex_velocity_m_s(flow.velocity, model, vertices),
+        outflow,
+    )
+
+
+def _apply_matrix(matrix: np.ndarray, field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
+    return jnp.moveaxis(jnp.tensordot(jnp.asarray(matrix, jnp.float32), field, axes=(1, axis)), 0, axis)

@@ -1,0 +1,1 @@
+"""Temperature alone, by a linear solve."""

@@ -1,0 +1,208 @@
+"""`draft`: temperature from the shifts and what is known of the temperature; no flow physics.
+
+Unknown is the excess refractivity n on a vertex grid, in which the data are linear. Minimised:
+
+    1/2 sum_w (A n - d)^T W (A n - d)                        the shifts, noise and representation error
+  + 1/2 sum_v (n - n_known)^2 / std^2                        planes
+  + 1/2 sum_m (mean_m n - n_mean)^2 / std^2                  outlets, sensors
+  + 1/2 int (n'^2 + lx^2 (dx n')^2 + ly^2 (dy n')^2 + lz^2 (dz n')^2) / s^2      n' = n - prior
+
+One view sees integrals along its rays: across them the data decide, along them the prior (smooth: ly is
+long) and the known planes do. Where no plane gives the profile over height, n' is the departure from a
+profile of its own, which costs only (Dz profile)^2 / step^2: pictures do not see the level, so nothing but
+thermometers may hold it.
+
+Cost: conjugate gradients, two operator products an iteration; a few solves more for the deviations. Error:
+what varies along the rays and is not on a known plane stays unseen.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, cg
+
+from core.air import Air
+from core.known import VertexGrid, known_temperature
+from core.problem import Problem, ShiftMeasurement
+from core.result import Outcome, Solution
+from core.scene import ProjectedPattern
+from core.setting import SettingError
+from core.solve.draft.temperature_deviation import deviation
+from core.solve.draft.temperature_prior import (
+    TemperatureSettings,
+    data_weight,
+    excess,
+    lengths_m,
+    level_k,
+    prior_size,
+    prior_temperature,
+    profile_range_k,
+    profile_weight,
+)
+from core.solve.draft.temperature_system import (
+    ShiftOperator,
+    System,
+    Volume,
+    linear_operator,
+    preconditioner,
+    steepest_slopes,
+)
+
+OnEvent = Callable[[dict[str, Any]], object]
+
+# Thinner air than at this temperature is none: without a limit 0 K comes next, and then less.
+_HOTTEST_K = 5000.0
+_NOT_AIR = (
+    "Some of the shifts are larger than air could make: the temperature is cut at 5000 K. Something else moved; "
+    "check the drift, and that both captures show the same pattern."
+)
+# Lit by a projector the shift is what is left of two larger ones, each with its representation error.
+_TWO_PATHS = 3.3
+# Draws are solved more tightly: the broad modes, which are the uncertain ones, come last.
+_DRAWN = 3e-4
+
+
+def solve_temperature(
+    problem: Problem,
+    operators: tuple[ShiftOperator, ...],
+    grid: VertexGrid,
+    settings: TemperatureSettings,
+    on_event: OnEvent | None = None,
+) -> Solution:
+    """Temperature on `grid`; one operator a view. Raises SettingError for contradictory knowledge."""
+    started = time.perf_counter()
+    air = problem.scene.air
+    system, prior = _system(problem, operators, grid, settings)
+    inverse = preconditioner(system)
+    n, iterations, settled = _minimise(system, inverse, problem.shifts, prior, air, settings, on_event)
+    doubted = system.with_fewer_data(settings.together * _paths(problem) ** 2)
+    rough = preconditioner(doubted)
+    std = deviation(
+        doubted, lambda rhs: _solved(doubted, rough, rhs, _DRAWN, settings)[0], settings.draws, seed=0
+    )
+    index = n + air.ambient_refractivity
+    thinnest = air.ambient_refractivity * air.ambient_temperature_k / _HOTTEST_K
+    temperature = air.ambient_refractivity * air.ambient_temperature_k / np.maximum(index, thinnest)
+    # dT = (T / T0)^2 dn T0 / N0.
+    std_k = std / system.per_k * (temperature / air.ambient_temperature_k) ** 2
+    x, y, z = grid.axes_m
+    return Solution(
+        x_m=x,
+        y_m=y,
+        z_m=z,
+        temperature_k=temperature,
+        temperature_std_k=std_k if settings.draws else None,
+        outcome=Outcome.converged if settled else Outcome.step_limit,
+        solver_s=time.perf_counter() - started,
+        history=iterations,
+        notes=(
+            "Temperature only: velocity and pressure are not solved for by this preset.",
+            "What varies along the line of sight comes from the prior, not from the images.",
+            *([_NOT_AIR] if (index < thinnest).any() else []),
+        ),
+    )
+
+
+def _system(
+    problem: Problem, operators: tuple[ShiftOperator, ...], grid: VertexGrid, settings: TemperatureSettings
+) -> tuple[System, Volume]:
+    """The quadratic problem, and the prior as excess refractivity."""
+    air = problem.scene.air
+    known = known_temperature(problem, grid)
+    if not known.mask.any() and not known.means:
+        raise SettingError(
+            "Nothing fixes the level of the temperature: deflections see only gradients. "
+            "Add an inlet, a plane field, an outlet's mean temperature, or a point sensor to the scene."
+        )
+    # Kelvin to excess refractivity at ambient: only scales weights, never values.
+    per_k = air.ambient_refractivity / air.ambient_temperature_k
+    prior_k = prior_temperature(problem, grid)
+    prior = excess(air, prior_k + level_k(known, prior_k) - air.ambient_temperature_k)
+    representation = _paths(problem) * settings.representation
+    weights = tuple(data_weight(s, representation) for s in problem.shifts)
+    size = prior_size(operators, weights, problem.shifts, prior, grid, settings)
+    # A room's worth of independent values: one a hundred vertices.
+    mass = 0.01 / size**2
+    lengths = lengths_m(grid, settings)
+    stiff = [mass * (length / h) ** 2 for length, h in zip(lengths, grid.spacing_m, strict=True)]
+    return System(
+        grid,
+        operators,
+        weights,
+        known,
+        per_k,
+        stiffness=(stiff[0], stiff[1], stiff[2]),
+        mass=mass,
+        slopes=steepest_slopes(problem.scene),
+        profile=None if problem.planes else profile_weight(per_k * profile_range_k(problem), grid),
+    ), prior
+
+
+def _paths(problem: Problem) -> float:
+    return _TWO_PATHS if isinstance(problem.scene.light, ProjectedPattern) else 1.0
+
+
+def _minimise(
+    system: System,
+    inverse: LinearOperator,
+    shifts: tuple[ShiftMeasurement, ...],
+    prior: Volume,
+    air: Air,
+    settings: TemperatureSettings,
+    on_event: OnEvent | None,
+) -> tuple[Volume, tuple[dict[str, float], ...], bool]:
+    """Conjugate gradients on the departure from the prior."""
+    shape, ambient = system.grid.shape, air.ambient_temperature_k
+    history: list[dict[str, float]] = []
+
+    def record(flat: np.ndarray) -> None:
+        history.append({"iteration": len(history) + 1.0, "change": float(np.abs(flat).max() / system.per_k)})
+        if on_event:
+            n = (prior + flat.reshape(shape))[:, shape[1] // 2]
+            plane = -ambient * n / (air.ambient_refractivity + n)
+            on_event({**history[-1], "excess_plane_k": plane.astype(np.float32)})
+
+    rhs = _right_hand_side(system, shifts, prior, air)
+    found, settled = _solved(system, inverse, rhs, settings.tolerance, settings, record)
+    return prior + found, tuple(history), settled
+
+
+def _right_hand_side(system: System, shifts: tuple[ShiftMeasurement, ...], prior: Volume, air: Air) -> Volume:
+    """Minus the gradient at the prior."""
+    known, ambient = system.known, air.ambient_temperature_k
+    rhs = -system.data_terms(prior) - system.known_terms(prior)
+    for operator, weight, shift in zip(system.operators, system.weights, shifts, strict=True):
+        rhs += operator.transpose(np.einsum("wab,wb->wa", weight, shift.displacement_px))
+    target = excess(air, np.where(known.mask, known.temperature_k, ambient) - ambient)
+    rhs[known.mask] += (target / (known.std_k * system.per_k) ** 2)[known.mask]
+    for members, kelvin, std in known.means:
+        value = float(excess(air, np.array(kelvin - ambient)))
+        rhs.reshape(-1)[members] += value / (len(members) * (std * system.per_k) ** 2)
+    return rhs
+
+
+def _solved(
+    system: System,
+    inverse: LinearOperator,
+    rhs: Volume,
+    tolerance: float,
+    settings: TemperatureSettings,
+    record: Callable[[np.ndarray], None] | None = None,
+) -> tuple[Volume, bool]:
+    """The Hessian's inverse times `rhs`, and whether it was reached."""
+
+    def hessian(flat: np.ndarray) -> np.ndarray:
+        n = flat.reshape(rhs.shape)
+        return (system.data_terms(n) + system.known_terms(n) + system.smooth(n)).ravel()
+
+    found, info = cg(
+        linear_operator(hessian, rhs.size),
+        rhs.ravel(),
+        rtol=tolerance,
+        maxiter=settings.max_iterations,
+        M=inverse,
+        callback=record,
+    )
+    return found.reshape(rhs.shape), info == 0

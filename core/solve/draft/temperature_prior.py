@@ -1,0 +1,160 @@
+"""What `draft` believes of the temperature before it looks at the pictures, and what a window weighs.
+
+The prior is the known plane's profile over height carried away from its wall. Without a plane the level is that of
+the thermometers, and the profile is free but for the range of the air that is known. The size of departures is
+the one at which smooth random fields move the pattern as far as it moved (moment matching): a cool room is not
+given a hot room's freedom, and a projector beside the camera, which hardly sees broad fields, is not believed
+about them.
+"""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.ndimage import gaussian_filter
+
+from core.air import Air
+from core.known import KnownTemperature, VertexGrid, known_temperature, plane_on_grid, wall_index
+from core.problem import Problem, ShiftMeasurement
+from core.scene import Heater, Inlet, Outlet
+from core.setting import setting
+from core.solve.draft.temperature_system import ShiftOperator, Volume
+
+# A thousandth of a kelvin, as excess refractivity.
+_LEAST_SIZE = 1e-9
+_LEAST_RANGE_K = 0.1
+# A profile rises by anything between nothing and the range of the air that is known: half of it, give or take.
+_RISE, _RISE_STD = 0.5, 12**-0.5
+_DRAWS = 4
+
+
+@setting
+class TemperatureSettings:
+    """Lengths over which the air varies, in parts of the room's longest edge, and when to stop.
+
+    `across` and `along` are across and along the view; `representation` is the part of the shift's size
+    that this grid cannot represent, added to the noise. The deviations come from `draws` draws of the
+    posterior (none: no deviations), in which windows count `together` times fewer: what a grid cannot hold
+    is wrong in neighbours alike. Twelve is the room solver's.
+    """
+
+    across: float = 0.04
+    along: float = 0.5
+    representation: float = 0.3
+    tolerance: float = 1e-3
+    max_iterations: int = 400
+    draws: int = 6
+    together: float = 12.0
+
+
+def profile_weight(reach: float, grid: VertexGrid) -> float:
+    """One over the variance of a step of the profile from one level to the next: a walk as wide as its rise."""
+    return (grid.shape[2] - 1) / (_RISE_STD * reach) ** 2
+
+
+def level_k(known: KnownTemperature, prior_k: Volume) -> float:
+    """What thermometers and outlets read above the prior, where no plane says how warm the room is.
+
+    Pictures do not see the level, and the prior's size is theirs: it must not pull the level to ambient.
+    """
+    if known.mask.any() or not known.means:
+        return 0.0
+    weights = np.array([std**-2 for _, _, std in known.means])
+    above = [kelvin - float(prior_k.reshape(-1)[members].mean()) for members, kelvin, _ in known.means]
+    return float(np.average(above, weights=weights))
+
+
+def prior_temperature(problem: Problem, grid: VertexGrid) -> Volume:
+    """The first known plane's profile over height carried through the room; without a plane the outlets' and
+    sensors' mean (ambient where there are none), rising over the height by half the range of the air that is known.
+
+    Only the profile is carried: a jet in the plane is somewhere else a metre further on. Warm air lies on cold:
+    a room's profile rises by anything from nothing to that range, and a rig that does not see it gets the middle.
+    """
+    # What leaves the room has its mean temperature: without it the prior would draw a warm room to ambient.
+    measured = [kelvin for _, kelvin, _ in known_temperature(problem, grid).means]
+    level = float(np.mean(measured)) if measured else problem.scene.air.ambient_temperature_k
+    rise_k = _RISE * profile_range_k(problem) if len(known_air_k(problem)) > 1 else 0.0
+    volume = np.broadcast_to(level + rise_k * np.linspace(-0.5, 0.5, grid.shape[2]), grid.shape).copy()
+    for plane in problem.planes[:1]:
+        axis, _ = wall_index(plane.wall)  # type: ignore[arg-type]
+        on_grid = np.expand_dims(plane_on_grid(grid, plane, plane.temperature_k), axis)
+        volume[...] = np.median(on_grid, axis=(0, 1), keepdims=True)
+    return volume
+
+
+def known_air_k(problem: Problem) -> list[float]:
+    """Temperatures of air that are known somewhere: supplies, heaters, outlets, sensors."""
+    kelvin = [float(t) for s in problem.sensors for t in s.temperature_k[np.isfinite(s.temperature_k)]]
+    for item in problem.scene.boundary:
+        match item:
+            case Inlet() | Heater():
+                kelvin.append(item.temperature_k)
+            case Outlet(mean_temperature_k=float() as mean):
+                kelvin.append(mean)
+            case _:
+                pass
+    return kelvin
+
+
+def profile_range_k(problem: Problem) -> float:
+    """How far a room's profile over height may reach: from the coldest to the hottest air that is known."""
+    kelvin = known_air_k(problem)
+    if len(kelvin) < 2:
+        kelvin.append(problem.scene.air.ambient_temperature_k)
+    return max(max(kelvin) - min(kelvin), _LEAST_RANGE_K)
+
+
+def prior_size(
+    operators: tuple[ShiftOperator, ...],
+    weights: tuple[Float[np.ndarray, "windows 2 2"], ...],
+    shifts: tuple[ShiftMeasurement, ...],
+    prior: Volume,
+    grid: VertexGrid,
+    settings: TemperatureSettings,
+) -> float:
+    """Rms of n - prior at which smooth random fields move the pattern as far as it moved beyond its noise."""
+    random = np.random.default_rng(0)
+    sigma = [length / h for length, h in zip(lengths_m(grid, settings), grid.spacing_m, strict=True)]
+    unit, seen, noise = 0.0, 0.0, 0.0
+    draws = [
+        gaussian_filter(random.standard_normal(grid.shape), sigma, mode="reflect") for _ in range(_DRAWS)
+    ]
+    for operator, weight, shift in zip(operators, weights, shifts, strict=True):
+        used = weight[:, 0, 0] > 0
+        spread = np.linalg.cholesky(np.linalg.inv(shift.information_per_px2[used]))
+        drawn = np.einsum("wab,wb->wa", spread, random.standard_normal((used.sum(), 2)))
+        noise += _most(drawn)
+        seen += _most((shift.displacement_px - operator.apply(prior))[used])
+        unit += float(np.mean([_most(operator.apply(d / d.std())[used]) for d in draws]))
+    if unit == 0.0:
+        return _LEAST_SIZE
+    # No less than a tenth of what noise alone would look like: zero would forbid every departure.
+    return max(float(np.sqrt(max(seen - noise, 0.01 * noise) / unit)), _LEAST_SIZE)
+
+
+def _most(shifts_px: Float[np.ndarray, "windows 2"]) -> float:
+    """Sum of squares without the largest tenth: thermal layers move the pattern more than the room's air."""
+    squares = np.sum(shifts_px**2, axis=1)
+    return float(squares[squares <= np.percentile(squares, 90)].sum()) if len(squares) else 0.0
+
+
+def lengths_m(grid: VertexGrid, settings: TemperatureSettings) -> tuple[float, float, float]:
+    """Over which n' varies, along x, y, z [m]."""
+    longest_m = max(grid.box.size_m)
+    return settings.across * longest_m, settings.along * longest_m, settings.across * longest_m
+
+
+def excess(air: Air, excess_k: np.ndarray) -> np.ndarray:
+    """`Air.excess_refractivity` in float64, whatever JAX is set to."""
+    return np.asarray(-air.ambient_refractivity * excess_k / (air.ambient_temperature_k + excess_k))
+
+
+def data_weight(shift: ShiftMeasurement, representation: float) -> Float[np.ndarray, "windows 2 2"]:
+    """Inverse covariance of noise and representation error; zero for windows far outside the rest."""
+    size = np.linalg.norm(shift.displacement_px, axis=1)
+    covariance = np.linalg.inv(shift.information_per_px2)
+    informed = np.trace(covariance, axis1=1, axis2=2) < 1.0
+    typical = float(np.sqrt(np.mean(np.minimum(size, np.percentile(size, 90)) ** 2)))
+    weight = np.linalg.inv(covariance + (representation * typical) ** 2 * np.eye(2))
+    # Beside a wall with a thermal layer inside a cell the pattern moves many times further: not this grid's.
+    outlier = size > 12 * typical + 6 * np.sqrt(np.trace(covariance, axis1=1, axis2=2))
+    return weight * (informed & ~outlier)[:, None, None]

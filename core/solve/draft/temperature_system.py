@@ -1,0 +1,204 @@
+"""The quadratic problem of `draft` in the excess refractivity n, flattened: its Hessian and a preconditioner.
+
+Conjugate gradients cost two operator products an iteration; the preconditioner is the smoothness term and the
+mean data term, which are diagonal under the cosine transform.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+from scipy.sparse.linalg import LinearOperator
+
+from core.known import KnownTemperature, VertexGrid
+from core.scene import Scene
+
+Volume = Float[np.ndarray, "nx ny nz"]
+
+
+@runtime_checkable
+class ShiftOperator(Protocol):
+    """The linear map from excess refractivity on vertices to displacements, and its transpose."""
+
+    def apply(self, values: Volume) -> Float[np.ndarray, "windows 2"]:
+        """Displacement [px] of every window."""
+        ...
+
+    def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Volume:
+        """The transposed map."""
+        ...
+
+
+@dataclass(frozen=True)
+class System:
+    """The quadratic problem in n, flattened."""
+
+    grid: VertexGrid
+    operators: tuple[ShiftOperator, ...]
+    weights: tuple[Float[np.ndarray, "windows 2 2"], ...]
+    known: KnownTemperature
+    per_k: float
+    stiffness: tuple[float, float, float]
+    mass: float
+    slopes: tuple[float, float]
+    # Where no plane gives the profile over height: how much a step of it from one level to the next weighs.
+    profile: float | None
+
+    def with_fewer_data(self, times: float) -> "System":
+        """The same with windows that count `times` fewer."""
+        return replace(self, weights=tuple(weight / times for weight in self.weights))
+
+    def smooth(self, n: Volume) -> Volume:
+        """Gradient of the prior's terms: size and smoothness, of departures from a profile that is free."""
+        total = np.zeros_like(n)
+        if self.profile is not None:
+            level = n.mean((0, 1), keepdims=True)
+            n = n - level
+            total += _second_differences(level, 2) * (self.profile / (n.shape[0] * n.shape[1]))
+        total += self.mass * n
+        for axis, factor in enumerate(self.stiffness):
+            total += factor * _second_differences(n, axis)
+        return total
+
+    def known_terms(self, n: Volume) -> Volume:
+        """Hessian of the known values and means, times n."""
+        total = np.zeros_like(n)
+        mask = self.known.mask
+        total[mask] = n[mask] / (self.known.std_k[mask] * self.per_k) ** 2
+        flat = total.reshape(-1)
+        for members, _, std in self.known.means:
+            flat[members] += n.reshape(-1)[members].mean() / (len(members) * (std * self.per_k) ** 2)
+        return total
+
+    def data_terms(self, n: Volume) -> Volume:
+        """Hessian of the data, times n."""
+        total = np.zeros_like(n)
+        for operator, weight in zip(self.operators, self.weights, strict=True):
+            total += operator.transpose(np.einsum("wab,wb->wa", weight, operator.apply(n)))
+        return total
+
+
+def preconditioner(system: System) -> LinearOperator:
+    """Inverse of a separable stand-in: eigenvectors along x and z, a dense system along the view y.
+
+    The stand-in is data = (Lx / hx^2 + Lz / hz^2) (x) W, with the levers W of the slabs measured on the
+    operators themselves. Rays of a perspective view cross a wave at other phases from slab to slab, by up
+    to their slope: the mean over the slopes makes a sinc of W's off-diagonals. Known planes pin their wall.
+    """
+    shape, spacing = system.grid.shape, system.grid.spacing_m
+    fx, fy, fz = system.stiffness
+    (lx, qx, dx), (lz, qz, dz) = (_modes(system, axis) for axis in (0, 2))
+    levers = _slab_levers(system)
+    smooth = fx * lx[:, None] + fz * lz[None]
+    across = dx[:, None] / spacing[0] ** 2 + dz[None] / spacing[2] ** 2
+    matrices = (
+        (smooth[..., None, None] + system.mass) * np.eye(shape[1])
+        + _mean_mass(system) * np.eye(shape[1])
+        + fy * _laplacian(shape[1])
+        + across[..., None, None] * levers * _coherence(system)
+    )
+    if system.profile is not None:
+        # The first mode along x, where it is even along y, is the profile.
+        weights = system.profile / (shape[0] * shape[1]) * lz - smooth[0] - system.mass
+        matrices[0] += weights[:, None, None] * np.full((shape[1], shape[1]), 1 / shape[1])
+    inverses = np.linalg.inv(matrices)
+
+    def apply(flat: np.ndarray) -> np.ndarray:
+        modes = np.einsum("xi,xyz,zk->iky", qx, flat.reshape(shape), qz, optimize=True)
+        modes = (inverses @ modes[..., None])[..., 0]
+        return np.einsum("xi,iky,zk->xyz", qx, modes, qz, optimize=True).ravel()
+
+    size = int(np.prod(shape))
+    return linear_operator(apply, size)
+
+
+def _second_differences(n: Volume, axis: int) -> Volume:
+    """Dᵀ D n along an axis with free ends."""
+    total = np.zeros_like(n)
+    difference = np.diff(n, axis=axis)
+    low, high = [slice(None)] * 3, [slice(None)] * 3
+    low[axis], high[axis] = slice(None, -1), slice(1, None)
+    total[tuple(low)] -= difference
+    total[tuple(high)] += difference
+    return total
+
+
+def slopes_back(random: np.random.Generator, shape: tuple[int, int, int], axis: int) -> Volume:
+    """Dᵀ of white noise between the vertices along an axis."""
+    noise = random.standard_normal([n - 1 if a == axis else n for a, n in enumerate(shape)])
+    return -np.diff(noise, axis=axis, prepend=0.0, append=0.0)
+
+
+def _mean_mass(system: System) -> float:
+    """What the known means weigh on a uniform departure, a vertex: nothing else may hold the level."""
+    weights = [1 / (std * system.per_k) ** 2 for _, _, std in system.known.means]
+    return float(sum(weights)) / int(np.prod(system.grid.shape))
+
+
+def _coherence(system: System) -> Float[np.ndarray, "nx nz ny ny"]:
+    """Mean over the view's slopes of the phase between two slabs, for each pair of waves along x and z."""
+    y_m = system.grid.axes_m[1]
+    apart_m = y_m[:, None] - y_m[None]
+    factors = []
+    for axis in (0, 2):
+        waves_per_m = np.arange(system.grid.shape[axis]) / (2 * system.grid.box.size_m[axis])
+        factors.append(np.sinc(2 * waves_per_m[:, None, None] * system.slopes[axis // 2] * apart_m))
+    return factors[0][:, None] * factors[1][None]
+
+
+def steepest_slopes(scene: Scene) -> tuple[float, float]:
+    """Largest slope of a camera ray against the view's axis y that meets the back wall, along x and z."""
+    room = scene.room
+    slopes = []
+    for axis in (0, 2):
+        reach = [
+            abs(end - view.camera.position_m[axis]) / (room.upper_m[1] - view.camera.position_m[1])
+            for view in scene.views
+            for end in (room.lower_m[axis], room.upper_m[axis])
+        ]
+        slopes.append(max(reach))
+    return slopes[0], slopes[1]
+
+
+def _laplacian(n: int) -> Float[np.ndarray, "n n"]:
+    """Second differences of a line with free ends, positive."""
+    laplacian = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    laplacian[0, 0] = laplacian[-1, -1] = 1.0
+    return laplacian
+
+
+def linear_operator(product: Callable[[np.ndarray], np.ndarray], size: int) -> LinearOperator:
+    """A symmetric product of flat vectors, for SciPy."""
+    return LinearOperator((size, size), matvec=product, dtype=np.float64)  # type: ignore[call-arg]
+
+
+def _modes(
+    system: System, axis: int
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n n"], Float[np.ndarray, " n"]]:
+    """Modes along an axis whose known end planes are pinned: smoothness, vectors, unpinned curvature."""
+    laplacian = _laplacian(system.grid.shape[axis])
+    pinned = laplacian.copy()
+    mask, std = (np.moveaxis(v, axis, 0) for v in (system.known.mask, system.known.std_k))
+    for end in (0, -1):
+        if mask[end].mean() > 0.5:
+            weight = np.mean(1 / (std[end][mask[end]] * system.per_k) ** 2)
+            pinned[end, end] += weight / system.stiffness[axis]
+    values, vectors = np.linalg.eigh(pinned)
+    return values, vectors, np.einsum("ai,ab,bi->i", vectors, laplacian, vectors)
+
+
+def _slab_levers(system: System) -> Float[np.ndarray, "ny ny"]:
+    """Hessian of the data for a unit gradient across the view, slab by slab along y, a vertex of the face."""
+    shape, spacing = system.grid.shape, system.grid.spacing_m
+    total = np.zeros((shape[1], shape[1]))
+    for operator, weight in zip(system.operators, system.weights, strict=True):
+        shifts = []
+        for j in range(shape[1]):
+            ramp = np.zeros(shape)
+            ramp[:, j, :] = (np.arange(shape[0]) * spacing[0])[:, None]
+            shifts.append(operator.apply(ramp))
+        stacked = np.stack(shifts)
+        total += np.einsum("iwa,wab,jwb->ij", stacked, weight, stacked, optimize=True)
+    return total / (shape[0] * shape[2])

@@ -1,0 +1,1 @@
+"""Unknowns on a staggered grid, solved by Gauss-Newton."""

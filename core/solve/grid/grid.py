@@ -1,0 +1,274 @@
+"""`grid`: (T, p, u) on a staggered grid, coarse to fine, by Gauss-Newton steps.
+
+Every level adds corrections to the coarser ones, so that CG moves all wavelengths at once. Cost: a few
+steps a level, each some tens of CG iterations of two linearised residuals.
+"""
+
+import dataclasses
+import time
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, PyTree
+
+from core.grid.multiresolution import MultiGrid, zero_multigrid
+from core.grid.staggered import StaggeredGrid
+from core.losses.physics import Loss, all_rows
+from core.losses.representation import Unknowns, positions
+from core.problem import Problem
+from core.result import Outcome, Solution
+from core.setting import SettingError, setting
+from core.solve.check import check_problem
+from core.solve.checkpoint import CheckpointStore, configuration_hash, encode, newest, restore
+from core.solve.grid.gauss_newton import Step, column_scale, gauss_newton_step
+from core.solve.grid.start import starting_flow
+from core.solve.nondimensional import Frame, frame_of
+from core.solve.regime import DataModel, Regime, Weights, losses_of
+from core.solve.solution import solution_of
+
+OnEvent = Callable[[dict[str, Any]], object]
+
+# The columns' sizes are measured before a level's first two steps: the first sets the air in motion.
+_SCALED_AT = (0, 1)
+
+
+@setting
+class GridSettings:
+    """`cells` an axis of the finest grid (a power of two times `coarsest`), and how hard each level works."""
+
+    regime: Regime = "bos+pde+boundary"
+    cells: int = 32
+    coarsest: int = 16
+    steps_a_level: int = 6
+    cg_iterations: int = 60
+    settled: float = 0.02
+    damping: float = 1e-6
+    weights: Weights = Weights()
+    data: DataModel = DataModel()
+    time_limit_s: float | None = None
+
+    def __post_init__(self) -> None:
+        ratio = self.cells / self.coarsest
+        if self.coarsest < 4 or ratio < 1 or 2 ** round(np.log2(ratio)) * self.coarsest != self.cells:
+            raise SettingError(
+                f"The grid has {self.cells} cells an axis over a coarsest level of {self.coarsest}; expected "
+                "cells = coarsest times a power of two, and at least 4 (32 over 8, 96 over 12)."
+            )
+
+
+class GridState(eqx.Module):
+    """Everything that the next Gauss-Newton step depends on; the level is that of the unknowns."""
+
+    unknowns: Unknowns
+    scale: PyTree
+    damping: Float[Array, ""]
+    step: Int[Array, ""]
+    ended: Bool[Array, ""]
+
+
+def solve_grid(
+    problem: Problem,
+    settings: GridSettings,
+    *,
+    on_event: OnEvent | None = None,
+    store: CheckpointStore | None = None,
+    should_stop: Callable[[], bool] | None = None,
+    watch: Callable[[Solution], object] | None = None,
+) -> Solution:
+    """T, p, u on vertices, `cells` + 1 an axis. Raises SettingError for a problem that cannot be solved.
+
+    A run that `store` knows of goes on with the step it was at and ends bitwise as it would have on a CPU.
+    `should_stop` is asked about every second, but not while a level compiles. `watch` sees each step taken.
+    """
+    check_problem(problem, settings.regime)
+    clock = _Clock(settings.time_limit_s, should_stop or (lambda: False))
+    frame = frame_of(problem)
+    keeper = _Keeper(store, configuration_hash(_lasting(settings), problem.scene))
+    state, history = keeper.resumed(problem, frame, settings)
+    while True:
+        cells = _multigrid(state.unknowns).finest.cells[0]
+
+        def taken(state: GridState, history: list[dict[str, float]], cells: int = cells) -> None:
+            keeper.save(state, history)
+            if on_event:
+                on_event(history[-1])
+            if watch is not None:
+                shape = _cubic(cells + 1)
+                watch(solution_of(state.unknowns, frame, shape, Outcome.step_limit, clock.elapsed_s, ()))
+
+        losses = losses_of(
+            problem, frame, settings.regime, settings.weights, settings.data, _cubic(cells + 1), 2 * cells + 1
+        )
+        state, outcome = _descend(state, losses, settings, history, clock, taken)
+        if cells == settings.cells or outcome in (Outcome.nonfinite, Outcome.time_limit, Outcome.stopped):
+            break
+        # The next level compiles first, and compilation cannot be interrupted.
+        keeper.save(state, history, final=True)
+        state = _at_start(Unknowns(_multigrid(state.unknowns).refined(), *_others(state.unknowns)), settings)
+    if outcome is Outcome.stopped:
+        keeper.save(state, history, final=True)
+    shape = _cubic(settings.cells + 1)
+    return solution_of(state.unknowns, frame, shape, outcome, clock.elapsed_s, history)
+
+
+def initial_unknowns(problem: Problem, frame: Frame, settings: GridSettings) -> Unknowns:
+    """Still air in balance, as warm as what is known, on the coarsest grid."""
+    grid = StaggeredGrid(frame.lower, frame.upper, _cubic(settings.coarsest))
+    multigrid = zero_multigrid(grid)
+    spans = frame.vertices(_cubic(settings.coarsest + 1))
+    x, y, z = (positions(span) for span in spans)
+    state = grid.of_fields((x, y, z), starting_flow(problem, frame, spans, settings.regime))
+    levels = (*multigrid.levels[:-1], state)
+    drift = None
+    if settings.data.drift_std_px is not None and problem.shifts:
+        drift = jnp.zeros((len(problem.shifts), 4))
+    learned = jnp.zeros(2) if problem.scene.flow.transport == "learned" else None
+    return Unknowns(MultiGrid(levels, multigrid.grids), drift, learned)
+
+
+def _cubic(n: int) -> tuple[int, int, int]:
+    return n, n, n
+
+
+def _multigrid(unknowns: Unknowns) -> MultiGrid:
+    if not isinstance(unknowns.representation, MultiGrid):
+        raise TypeError(f"the grid solver was given {type(unknowns.representation).__name__}")
+    return unknowns.representation
+
+
+def _rows(unknowns: Unknowns, losses: tuple[Loss, ...]):
+    return all_rows(losses, unknowns)
+
+
+def _descend(
+    state: GridState,
+    losses: tuple[Loss, ...],
+    settings: GridSettings,
+    history: list[dict[str, float]],
+    clock: "_Clock",
+    taken: Callable[[GridState, list[dict[str, float]]], None],
+) -> tuple[GridState, Outcome]:
+    """Gauss-Newton on one level until a step gains less than `settled`; a bad step is taken back."""
+    outcome = Outcome.step_limit if int(state.step) else Outcome.converged
+    while not bool(state.ended):
+        if clock.is_over:
+            return state, Outcome.time_limit
+        if int(state.step) in _SCALED_AT:
+            scale = column_scale(_rows, state.unknowns, losses)
+            state = dataclasses.replace(state, scale=scale)
+        step = gauss_newton_step(
+            _rows, state.unknowns, losses, state.damping, settings.cg_iterations, 1e-2,
+            scale=state.scale, should_stop=clock.should_stop,
+        )  # fmt: skip
+        if step is None:
+            return state, Outcome.stopped
+        if not np.isfinite(float(step.cost_before)):
+            return state, Outcome.nonfinite
+        history.append(_record(step, state, clock.elapsed_s))
+        state, outcome = _judged(state, step, settings)
+        taken(state, history)
+    return state, outcome
+
+
+def _judged(state: GridState, step: Step, settings: GridSettings) -> tuple[GridState, Outcome]:
+    """The state after a step, which is taken where it lowers the cost, and how the level would end here."""
+    before, after, number = float(step.cost_before), float(step.cost_after), int(state.step) + 1
+    if after < before:
+        unknowns, damping = step.unknowns, max(float(state.damping) / 5, 1e-8)
+        small = before - after < settings.settled * before
+        outcome = Outcome.converged if small else Outcome.step_limit
+        ended = small or number >= settings.steps_a_level
+    else:
+        unknowns, damping = state.unknowns, max(10 * float(state.damping), 1e-6)
+        hopeless = damping > 1e2
+        outcome = Outcome.converged if np.isfinite(after) else Outcome.nonfinite
+        ended = hopeless or number >= settings.steps_a_level
+        if ended and not hopeless:
+            outcome = Outcome.step_limit
+    return GridState(
+        unknowns, state.scale, jnp.float32(damping), jnp.int32(number), jnp.array(ended)
+    ), outcome
+
+
+def _at_start(unknowns: Unknowns, settings: GridSettings) -> GridState:
+    scale = jax.tree.map(lambda a: jnp.ones((), a.dtype), unknowns)
+    return GridState(unknowns, scale, jnp.float32(settings.damping), jnp.int32(0), jnp.array(False))
+
+
+def _others(unknowns: Unknowns) -> tuple[Array | None, Array | None]:
+    return unknowns.drift_px, unknowns.log_transport
+
+
+def _record(step: Step, state: GridState, elapsed_s: float) -> dict[str, float]:
+    return {
+        "cells": float(_multigrid(state.unknowns).finest.cells[0]),
+        "loss": 2 * float(step.cost_before),
+        "loss_after": 2 * float(step.cost_after),
+        "cg_iterations": float(step.cg_iterations),
+        "damping": float(state.damping),
+        "elapsed_s": elapsed_s,
+    }
+
+
+def _lasting(settings: GridSettings) -> GridSettings:
+    """Without what a resumed run may change."""
+    return dataclasses.replace(settings, time_limit_s=None)
+
+
+class _Clock:
+    """The time since the start, its limit, and whether somebody asked to stop."""
+
+    def __init__(self, limit_s: float | None, should_stop: Callable[[], bool]) -> None:
+        self._began, self._limit_s, self.should_stop = time.perf_counter(), limit_s, should_stop
+
+    @property
+    def elapsed_s(self) -> float:
+        return time.perf_counter() - self._began
+
+    @property
+    def is_over(self) -> bool:
+        return self._limit_s is not None and self.elapsed_s > self._limit_s
+
+
+class _Keeper:
+    """Saves after a step, at a cost of at most 1 % of the time; finds the state to start from."""
+
+    def __init__(self, store: CheckpointStore | None, configuration: str) -> None:
+        self._store, self._configuration = store, configuration
+        self._last, self._cost_s = time.perf_counter(), 0.0
+
+    def resumed(
+        self, problem: Problem, frame: Frame, settings: GridSettings
+    ) -> tuple[GridState, list[dict[str, float]]]:
+        """The newest checkpoint's state and history, or the start's."""
+        state = _at_start(initial_unknowns(problem, frame, settings), settings)
+        found = newest(self._store) if self._store else None
+        if found is None:
+            return state, []
+        history = list(found.header["history"])
+        cells = int(found.header["shape"].get("cells", settings.coarsest))
+        while _multigrid(state.unknowns).finest.cells[0] < cells:
+            finer = _multigrid(state.unknowns).refined()
+            state = _at_start(Unknowns(finer, *_others(state.unknowns)), settings)
+        return restore(found, state, configuration=self._configuration), history
+
+    def save(self, state: GridState, history: list[dict[str, float]], *, final: bool = False) -> None:
+        """Keep the state, if it is time or the last chance."""
+        now = time.perf_counter()
+        if self._store is None or not (final or now - self._last >= 100 * self._cost_s):
+            return
+        content = encode(
+            state,
+            configuration=self._configuration,
+            step=len(history),
+            seed=0,
+            history=history,
+            shape={"cells": _multigrid(state.unknowns).finest.cells[0]},
+        )
+        self._store.save(content)
+        self._last = time.perf_counter()
+        self._cost_s = self._last - now

@@ -1,0 +1,1 @@
+"""The paper's network (T, p, u) and its optimisation."""

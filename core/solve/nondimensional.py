@@ -1,0 +1,130 @@
+"""A scene without dimensions: its scales, its numbers, its box."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from core.geometry import Box
+from core.losses.boussinesq import Flow, Numbers, Scales, scales
+from core.losses.representation import Spans, positions
+from core.problem import Problem
+from core.scene import FlowModel, Heater, Inlet, Outlet, Wall
+from core.setting import SettingError
+
+# ν_eff = U L / Re of the mean flow where nothing is given. Two RANS rooms (warm jets, 0.3 and 0.5 m/s,
+# volume-mean ν + ν_t) have 1490 and 1790 for momentum and 1260 and 1520 for heat.
+_EFFECTIVE_REYNOLDS = 1600.0
+_EFFECTIVE_PECLET = 1400.0
+
+
+class Frame(NamedTuple):
+    """Nondimensional coordinates are (x − lower corner) / length."""
+
+    room: Box
+    scales: Scales
+    numbers: Numbers
+    upper: tuple[float, float, float]
+    lower: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def vertices(self, shape: tuple[int, int, int]) -> Spans:
+        """The vertex grid of the room with this shape."""
+        x, y, z = ((low, up, n) for low, up, n in zip(self.lower, self.upper, shape, strict=True))
+        return x, y, z
+
+
+def frame_of(problem: Problem) -> Frame:
+    """Scales from the largest known speed and excess temperature; length is the room's height."""
+    scene = problem.scene
+    ambient = scene.air.ambient_temperature_k
+    excess, speeds = [0.0], [0.0]
+    for item in scene.boundary:
+        match item:
+            case Inlet():
+                excess.append(item.temperature_k - ambient)
+                speeds.append(sum(v * v for v in item.velocity_m_s) ** 0.5)
+            case Heater():
+                excess.append(item.temperature_k - ambient)
+            case Wall(temperature_k=float() as kelvin):
+                excess.append(kelvin - ambient)
+            case _:
+                pass
+    for plane in problem.planes:
+        departure = plane.temperature_k - ambient
+        excess.append(float(departure.flat[abs(departure).argmax()]))
+        speeds.append(float((plane.velocity_m_s**2).sum(-1).max() ** 0.5))
+    room = scene.room
+    found = scales(
+        length_m=room.size_m[2], speed_m_s=max(speeds), excess_k=max(excess, key=abs), air=scene.air
+    )
+    x, y, z = (size / found.length_m for size in room.size_m)
+    return Frame(room, found, _numbers(scene.flow, problem, found), (x, y, z))
+
+
+def height_profile(problem: Problem, frame: Frame, spans: Spans) -> Flow:
+    """Median over y of T and p on a known plane across x or y, carried through the room.
+
+    Without a plane the temperature of the air that leaves, where an outlet knows it, with the pressure of
+    that column: started without it the first step takes the buoyancy out of T instead of building p.
+    """
+    shape = tuple(span[2] for span in spans)
+    temperature = np.zeros(shape, np.float32)
+    pressure = np.zeros(shape, np.float32)
+    leaving = measured_outlets(problem)
+    if leaving:
+        level_k = float(np.mean([kelvin for _, kelvin in leaving]))
+        level = (level_k - frame.scales.reference_k) / frame.scales.excess_k
+        temperature += level
+        pressure += frame.numbers.richardson * level * (positions(spans[2]) - outlet_height(problem, frame))
+    upright = [plane for plane in problem.planes if plane.wall[0] in "xy"]
+    if upright:
+        plane, scales = upright[0], frame.scales
+        z_m = frame.room.lower_m[2] + scales.length_m * positions(spans[2])
+        excess = np.median(plane.temperature_k, axis=0) - scales.reference_k
+        temperature[...] = np.interp(z_m, plane.second_m, excess / scales.excess_k)
+        pressure += (
+            np.interp(z_m, plane.second_m, np.median(plane.pressure_m2_s2, axis=0)) / scales.pressure_m2_s2
+        )
+    return Flow(jnp.asarray(temperature), jnp.asarray(pressure), jnp.zeros((*shape, 3)))
+
+
+def measured_outlets(problem: Problem) -> list[tuple[Outlet, float]]:
+    """The outlets whose mean temperature is known, with it."""
+    return [
+        (item, item.mean_temperature_k)
+        for item in problem.scene.boundary
+        if isinstance(item, Outlet) and item.mean_temperature_k is not None
+    ]
+
+
+def outlet_height(problem: Problem, frame: Frame) -> float:
+    """Where p is zero: the mean height of the outlets' middles, nondimensional; the floor without any."""
+    outlets = [item for item in problem.scene.boundary if isinstance(item, Outlet)]
+    return float(np.mean([_height(outlet, frame) for outlet in outlets])) if outlets else frame.lower[2]
+
+
+def _height(outlet: Outlet, frame: Frame) -> float:
+    """Of the patch's middle, where p is zero: nondimensional."""
+    room, patch = frame.room, outlet.patch
+    if patch.wall[0] == "z":
+        return frame.upper[2] if patch.wall == "z_max" else frame.lower[2]
+    middle_m = (patch.lower_m[1] + patch.upper_m[1]) / 2
+    return (middle_m - room.lower_m[2]) / frame.scales.length_m
+
+
+def _numbers(flow: FlowModel, problem: Problem, found: Scales) -> Numbers:
+    air, convection = problem.scene.air, found.velocity_m_s * found.length_m
+    match flow.transport:
+        case "molecular":
+            viscosity = air.kinematic_viscosity_m2_s
+            diffusivity = viscosity / air.prandtl
+        case "given":
+            if flow.viscosity_m2_s is None or flow.diffusivity_m2_s is None:
+                raise SettingError(
+                    f"Flow transport is 'given', with viscosity_m2_s {flow.viscosity_m2_s} and "
+                    f"diffusivity_m2_s {flow.diffusivity_m2_s}; give both, or take transport = 'auto'."
+                )
+            viscosity, diffusivity = flow.viscosity_m2_s, flow.diffusivity_m2_s
+        case _:
+            viscosity, diffusivity = convection / _EFFECTIVE_REYNOLDS, convection / _EFFECTIVE_PECLET
+    return found.numbers(viscosity_m2_s=viscosity, diffusivity_m2_s=diffusivity, air=air)

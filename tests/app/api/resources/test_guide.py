@@ -1,0 +1,78 @@
+"""The guided calibration through the client: asked, taken, forgotten, skipped, stopped."""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from app.api.resources.guide import GuideResource, StepText
+from app.client import Client, ServiceError
+from tests.app.api.conftest import Live
+
+
+@pytest.fixture(scope="module")
+def airlens(live: Live) -> Iterator[Client]:
+    with Client(live.url, live.token, timeout_s=200) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def experiment(airlens: Client) -> str:
+    return airlens.create_experiment("A rig to calibrate", camera_px=256, light="projector").experiment
+
+
+def finished(airlens: Client, experiment: str, step: StepText = "camera") -> GuideResource:
+    until_s = time.monotonic() + 200
+    while (found := airlens.guide(experiment, step)).state == "running":
+        assert time.monotonic() < until_s
+        time.sleep(0.05)
+    return found
+
+
+def test_the_guide_asks_for_a_view_and_counts_it(airlens: Client, experiment: str):
+    first = airlens.guide(experiment)
+    assert first.wanted is not None
+    assert first.wanted.text.startswith("Show the board in the middle")
+    assert (first.state, first.views, first.covered, first.complete) == ("idle", [], 0.0, False)
+
+    assert airlens.take_guided(experiment).state == "running"
+    after = finished(airlens, experiment)
+
+    assert after.state == "idle"
+    assert [view.name for view in after.views] == ["view_00.png"]
+    assert after.views[0].points == 54
+    assert after.covered > 0.05
+    assert after.wanted is not None
+    assert after.wanted.nearer == "left"
+    # The live picture showed it.
+    assert airlens.camera().name == "simulated camera"
+
+
+def test_views_are_forgotten_and_wants_are_skipped(airlens: Client, experiment: str):
+    left = airlens.retake_view(experiment, "view_00.png")
+    assert left.views == []
+    assert left.wanted is not None
+    assert left.wanted.nearer == ""
+    with pytest.raises(ServiceError, match="known are: none"):
+        airlens.retake_view(experiment, "view_00.png")
+    skipped = airlens.skip_guided(experiment)
+    assert skipped.wanted is not None
+    assert skipped.wanted.nearer == "left"
+
+
+def test_a_sequence_is_stopped_within_a_frame_and_blocks_a_second(airlens: Client, experiment: str):
+    airlens.take_guided(experiment, "projector", frames=20)
+    with pytest.raises(ServiceError, match="taking pictures"):
+        airlens.take_guided(experiment, "projector")
+    stopped = airlens.stop_guided(experiment, "projector")
+    assert stopped.state == "idle"
+    assert "kept" in stopped.reason
+    assert stopped.views == []
+
+
+def test_a_step_that_cannot_begin_says_why(airlens: Client, experiment: str):
+    answer = airlens.guide(experiment, "wall")
+    assert answer.wanted is None
+    assert "calibrate" in answer.reason
+    with pytest.raises(ServiceError, match="calibrate"):
+        airlens.take_guided(experiment, "wall")

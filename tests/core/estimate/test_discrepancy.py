@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+
+from core.estimate.discrepancy import Correction, temperature_correction
+from core.estimate.observation import Observations, observations
+from core.estimate.posterior import bent_m4_s4, carried_m2_s2
+from core.geometry import Box, looking_along_y
+from core.problem import PlaneData, Problem
+from core.scene import FixedTexture, Outlet, Patch, Scene, View
+
+VERTICES = (17, 13, 15)
+Y, Z = np.linspace(-1.0, 1.0, 25), np.linspace(0.0, 2.4, 25)
+# What the room predicts everywhere [K above ambient].
+PREDICTED_K = 4.0
+DEPARTURE_K = 0.2
+
+
+def data(*planes: PlaneData, leaving_k: float | None = None) -> Observations:
+    """No pictures: thermometers alone."""
+    camera = looking_along_y(position_m=(1.5, -8.0, 1.2), width_px=64, height_px=48, focal_px=150.0)
+    mean_k = None if leaving_k is None else 293.15 + leaving_k
+    exhaust = Outlet(
+        patch=Patch(wall="x_min", lower_m=(-0.3, 0.2), upper_m=(0.3, 0.6)),
+        mean_temperature_k=mean_k,
+        temperature_std_k=0.05,
+    )
+    scene = Scene(
+        room=Box(lower_m=(0.0, -1.0, 0.0), upper_m=(3.0, 1.0, 2.4)),
+        views=(View(camera=camera),),
+        light=FixedTexture(),
+        boundary=(exhaust,),
+    )
+    return observations(Problem(scene, (), planes), VERTICES)
+
+
+def plane(excess_k: float) -> PlaneData:
+    temperature = np.full((25, 25), 293.15 + excess_k)
+    return PlaneData("x_min", Y, Z, temperature, np.zeros((25, 25)), np.zeros((25, 25, 3)))
+
+
+def corrected(seen: Observations, level_std_k: float, unknown_walls: tuple[str, ...] = ()) -> Correction:
+    residual = seen.values()[0] - PREDICTED_K
+    room = np.full(VERTICES, PREDICTED_K)
+    return temperature_correction(seen, room, residual, DEPARTURE_K, level_std_k, unknown_walls)
+
+
+def test_what_leaves_moves_the_level_as_far_as_it_was_open():
+    seen = data(leaving_k=PREDICTED_K + 0.3)
+    free, held = corrected(seen, 1.0), corrected(seen, 0.01)
+
+    np.testing.assert_allclose(free.excess_k, 0.3, atol=0.02)
+    assert np.ptp(free.excess_k) < 0.01
+    assert np.abs(held.excess_k).max() < 0.05
+    assert (free.variance_k2 < 0.02 * free.prior_variance_k2).all()
+
+
+def test_a_plane_counts_for_the_level_where_its_wall_is_stated_and_half_where_its_layer_is_unknown():
+    seen = data(plane(PREDICTED_K + 0.4))
+    stated, unknown = corrected(seen, DEPARTURE_K), corrected(seen, DEPARTURE_K, ("x_min",))
+
+    np.testing.assert_allclose(stated.excess_k, 0.4, atol=0.05)
+    np.testing.assert_allclose(unknown.excess_k, 0.2, atol=0.03)
+    # And says so: half of the level's variance is left.
+    assert np.median(unknown.variance_k2) == pytest.approx(0.5 * DEPARTURE_K**2, rel=0.1)
+    assert np.median(stated.variance_k2) < 0.2 * DEPARTURE_K**2
+
+
+def test_without_data_nothing_moves_and_nothing_is_learnt():
+    found = corrected(data(), 0.5)
+    assert not found.excess_k.any()
+    np.testing.assert_allclose(found.variance_k2, found.prior_variance_k2, rtol=1e-6)
+
+
+def test_warmer_air_carries_more_pressure_up():
+    z_m = np.linspace(0.0, 2.4, 15)
+    seen = data()
+    carried = carried_m2_s2(Problem(seen.scene, ()), z_m, np.full((4, 4, 15), 2.0))
+    np.testing.assert_allclose(carried, 9.81 / 293.15 * 2.0 * z_m, rtol=1e-6)
+
+
+def test_an_open_level_leaves_pressure_open_at_floor_and_ceiling_and_not_half_way_up():
+    z_m = np.linspace(0.0, 2.4, 15)
+    std = np.sqrt(bent_m4_s4(Problem(data().scene, ()), z_m, np.full((4, 4, 15), 0.2**2)))
+    assert std.shape == (4, 4, 15)
+    np.testing.assert_allclose(std[2, 1], 9.81 / 293.15 * 0.2 * np.abs(z_m - 1.2), rtol=1e-6, atol=1e-12)

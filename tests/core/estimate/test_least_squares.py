@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+
+from core.estimate.least_squares import gauss_newton, weighted_variance
+from core.estimate.parameter_step import secant
+
+
+def test_the_closure_is_not_let_go_in_a_wrong_supplys_place():
+    # Data that see only the sum of two parameters, a supply and the closure's viscosity: ten deviations away.
+    jacobian, residual, variance = np.ones((8, 2)), np.zeros(8), np.ones(8)
+
+    def moved(firm: list[bool]) -> np.ndarray:
+        return gauss_newton(np.array([5.0, 5.0]), residual, variance, jacobian, np.array(firm)).vector
+
+    # Were both priors Student's, nothing would tell the two apart.
+    same = moved([False, False])
+    assert same[0] == pytest.approx(same[1])
+    # A firm one pulls as far as one step may go (three deviations), and the supply takes it up.
+    entry, closure = moved([False, True])
+    assert closure == pytest.approx(2.0)
+    assert entry > 7.0
+
+
+def test_where_all_are_trusted_both_move_alike():
+    jacobian, residual, variance = np.ones((8, 2)), np.full(8, 2.0), np.ones(8)
+
+    found = gauss_newton(np.zeros(2), residual, variance, jacobian, np.array([False, True]), trusting=True)
+
+    # 8 (2 - a - b) = a = b.
+    assert found.vector == pytest.approx(np.full(2, 16.0 / 17.0))
+
+
+def test_a_damped_step_keeps_parameters_together_that_make_up_for_one_another():
+    # Data that see the difference of two parameters ten times better than their sum, both 50 deviations away.
+    jacobian = np.array([[10.0, -10.0], [1.0, 1.0]])
+    residual, variance = np.array([0.0, 100.0]), np.full(2, 1e-4)
+
+    def step(reach: float) -> np.ndarray:
+        firm = np.array([True, True])
+        return gauss_newton(np.zeros(2), residual, variance, jacobian, firm, reach=reach).vector
+
+    near, far = step(0.5), step(2.0)
+    for reached, reach in ((near, 0.5), (far, 2.0)):
+        assert 0.4 * reach < np.abs(reached).max() <= reach
+        assert reached[0] == pytest.approx(reached[1], rel=1e-3)
+
+
+def test_a_march_teaches_the_jacobian_its_own_move_and_nothing_else():
+    jacobian = np.arange(6.0).reshape(3, 2)
+    moved, change = np.array([1.0, 1.0]), np.array([4.0, 0.0, -2.0])
+
+    learned = secant(jacobian, moved, change)
+
+    np.testing.assert_allclose(learned @ moved, change)
+    across = np.array([1.0, -1.0])
+    np.testing.assert_allclose(learned @ across, jacobian @ across)
+
+
+def test_far_from_the_truth_images_are_believed_no_more_than_their_misfit():
+    # Ten shifts that are off by 3 and a thermometer by 2, of a room that two grids give within a tenth.
+    group = np.array([0] * 10 + [4])
+    residual = np.where(group == 0, 3.0, 2.0)
+    noise, grids = np.full(11, 1e-4), np.full(11, 0.1)
+
+    near = weighted_variance(noise, group, residual, grids)
+    far = weighted_variance(noise, group, residual, grids, far=True)
+
+    assert far[0] / near[0] == pytest.approx((9.0 + 1e-4) / (0.01 + 1e-4))
+    assert far[-1] == near[-1]

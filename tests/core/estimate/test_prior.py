@@ -1,0 +1,95 @@
+"""What of a room is fitted where walls are unknown, how stubbornly, and how far each number is moved to see it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.estimate.diagnostics import undetermined
+from core.estimate.forward_runs import Derivatives, differences
+from core.estimate.observation import Prediction
+from core.problem import Problem
+from core.room.grid import WALLS
+from core.scene import FlowModel, Wall
+from tests.core.estimate.test_temperature_nudging import VERTICES, prior_of, problem
+
+
+def with_walls(**kelvin: float) -> Problem:
+    """The room of unknown walls, some of them stated after all."""
+    given = problem(stated=False)
+    walls = tuple(Wall(wall=name, thermal="temperature", temperature_k=k) for name, k in kelvin.items())
+    scene = replace(given.scene, boundary=(*given.scene.boundary, *walls))
+    return Problem(scene, ())
+
+
+def test_the_walls_that_the_camera_looks_through_are_fitted_as_one():
+    prior = prior_of(problem(stated=False))
+
+    fitted = [name for name in prior.names() if name.startswith("wall_excess_k")]
+    moved = np.where([name == "wall_excess_k[2]" for name in prior.names()], 1.5, 0.0)
+    found = np.asarray(prior.parameters(moved).wall_excess_k)
+    mean, std = (np.asarray(p.wall_excess_k) for p in (prior.mean, prior.std))
+
+    assert fitted == [f"wall_excess_k[{n}]" for n in (0, 1, 2, 4, 5)]
+    assert prior.unknown_walls() == list(WALLS)
+    np.testing.assert_allclose(found[[2, 3]], (mean + 1.5 * std)[2], rtol=1e-5)
+    np.testing.assert_allclose(found[[0, 1, 4, 5]], mean[[0, 1, 4, 5]])
+    assert "(y_min and y_max as one" in undetermined(with_walls(z_min=293.15))[0]
+
+
+@pytest.mark.parametrize("known", ["y_min", "y_max"])
+def test_where_one_of_them_is_stated_the_other_is_fitted_alone(known: str):
+    given = with_walls(**{known: 290.15})
+    prior = prior_of(given)
+    other = WALLS.index("y_max" if known == "y_min" else "y_min")
+
+    found = np.asarray(prior.parameters(np.ones(len(prior.names()))).wall_excess_k)
+
+    assert f"wall_excess_k[{other}]" in prior.names()
+    assert f"wall_excess_k[{WALLS.index(known)}]" not in prior.names()
+    assert found[WALLS.index(known)] == pytest.approx(-3.0, abs=1e-3)
+    assert "as one" not in undetermined(given)[0]
+
+
+def test_unknown_walls_are_not_let_go_and_moved_a_little_only():
+    unknown, stated = prior_of(problem(stated=False)), prior_of(with_walls(**dict.fromkeys(WALLS, 293.15)))
+
+    firm = dict(zip(unknown.names(), unknown.firm(), strict=True))
+    small = dict(zip(unknown.names(), differences(unknown) < 1.0, strict=True))
+
+    assert {n for n, f in firm.items() if not f} == {"inlet_excess_k[0]", "inlet_log_flow[0]"}
+    assert {n for n, f in small.items() if f} == {n for n in firm if n.startswith(("wall", "log_heat"))}
+    # A stated wall's heat coefficient may have been entered wrongly.
+    assert not dict(zip(stated.names(), stated.firm(), strict=True))["log_heat"]
+    assert np.all(differences(stated) > 1.0)
+
+
+def test_derivatives_are_per_prior_deviation_whatever_the_steps():
+    def room_of(excess_k: float) -> Prediction:
+        return Prediction(
+            np.full(VERTICES, excess_k), np.zeros(VERTICES), np.zeros((*VERTICES, 3)), 2.0 * excess_k
+        )
+
+    found = Derivatives(room_of(1.0), [room_of(7.0), room_of(1.6)], np.array([2.0, 0.3]))
+
+    np.testing.assert_allclose(found.per_deviation(lambda seen: seen.excess_k.mean()), [3.0, 2.0])
+    np.testing.assert_allclose(found.per_deviation(lambda seen: seen.outflow_excess_k), [6.0, 4.0])
+    empty = Derivatives(room_of(1.0), [], np.zeros(0))
+    assert empty.per_deviation(lambda seen: seen.excess_k).shape == (0, *VERTICES)
+
+
+@pytest.mark.parametrize(
+    ("flow", "fitted"),
+    [
+        (FlowModel(transport="given"), True),
+        (FlowModel(transport="given", viscosity_m2_s=1e-3), False),
+        (FlowModel(), False),
+    ],
+)
+def test_one_viscosity_that_nobody_stated_may_vary_over_the_room(flow: FlowModel, fitted: bool):
+    given = problem(stated=True)
+    prior = prior_of(Problem(replace(given.scene, flow=flow), ()))
+    lattice = [name for name in prior.names() if name.startswith("log_viscosity")]
+
+    assert len(lattice) == (36 if fitted else 0)
+    assert all(prior.firm()[[name in lattice for name in prior.names()]])

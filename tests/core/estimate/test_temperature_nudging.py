@@ -1,0 +1,75 @@
+"""A held room: what is told of the heat that it took, and that its level is not corrected twice."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from core.estimate.diagnostics import balances
+from core.estimate.observation import Prediction, observations
+from core.estimate.prior import Prior, room_prior
+from core.estimate.temperature_nudging import unheld
+from core.geometry import Box, looking_along_y
+from core.problem import Problem
+from core.room.forward import room
+from core.room.grid import WALLS
+from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, View, Wall
+
+VERTICES = (9, 8, 7)
+
+
+def problem(*, stated: bool) -> Problem:
+    """A room with a supply of 10 K above ambient; its walls adiabatic, or unknown."""
+    supply = Inlet(
+        patch=Patch(wall="x_min", lower_m=(0.7, 1.1), upper_m=(1.3, 1.5)),
+        temperature_k=303.15,
+        velocity_m_s=(0.4, 0.0, 0.0),
+    )
+    exhaust = Outlet(
+        patch=Patch(wall="x_min", lower_m=(0.7, 0.4), upper_m=(1.3, 0.6)), mean_temperature_k=298.15
+    )
+    walls = tuple(Wall(wall=name, thermal="adiabatic") for name in WALLS) if stated else ()
+    camera = looking_along_y(position_m=(1.0, -8.0, 1.0), width_px=64, height_px=64, focal_px=200.0)
+    scene = Scene(
+        room=Box(lower_m=(0.0, 0.0, 0.0), upper_m=(2.0, 2.0, 2.0)),
+        views=(View(camera=camera),),
+        light=FixedTexture(),
+        boundary=(supply, exhaust, *walls),
+    )
+    return Problem(scene, ())
+
+
+def prior_of(given: Problem) -> Prior:
+    return room_prior(given, room(given.scene, 8, "constant").layout)
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_room_that_was_held_goes_back_to_its_own_level_and_where_walls_are_unknown_to_its_profile(
+    stated: bool,
+):
+    given = problem(stated=stated)
+    data, free = observations(given, VERTICES), np.ones(VERTICES)
+    still = np.zeros((*VERTICES, 3))
+    own = np.random.default_rng(0).normal(5.0, 0.2, VERTICES)
+    before = Prediction(own, np.zeros(VERTICES), still, 5.0)
+    # 0.1 K warmer at the floor, 0.7 K at the ceiling; the outlet's middle is a quarter up.
+    warmer = np.linspace(0.1, 0.7, VERTICES[2])
+    held = Prediction(own + warmer, np.zeros(VERTICES), still, 5.5)
+
+    back = unheld(held, before, data, prior_of(given), free)
+
+    expected = own + (warmer - warmer.mean() if stated else 0.0)
+    np.testing.assert_allclose(back.excess_k, expected, atol=1e-9)
+    assert back.outflow_excess_k == pytest.approx(5.5 - (0.4 if stated else 0.25))
+
+
+@pytest.mark.parametrize(("held_k_m3_s", "said"), [(0.3, "W more"), (-0.3, "W less"), (0.02, None)])
+def test_heat_that_holding_took_is_said_where_it_matters(held_k_m3_s: float, said: str | None):
+    given = problem(stated=True)
+    parameters = prior_of(given).mean
+    parameters = eqx.tree_at(lambda p: p.inlet_excess_k, parameters, jnp.array([10.0]))
+
+    # 0.1 m3/s at 10 K is 1 K m3/s: a tenth of that is what counts.
+    sentences = balances(parameters, np.array([0.1]), 8.0, given, held_k_m3_s)
+
+    assert [said in s for s in sentences[1:]] == ([True] if said else [])
