@@ -22,9 +22,9 @@ from app.errors import AirlensError
 from app.files.compilation_cache import use_compilation_cache
 from app.files.durable import make_folder, write_json
 from app.jobs import kinds
+from app.jobs.attempt import Attempt, AttemptStoppedError, inherit_checkpoint, publish
 from app.jobs.errors import FencedError
 from app.jobs.folder import JobFolder, Owner, beat, try_lock
-from app.jobs.task import StoppedError, Task, inherit_checkpoint, publish
 from app.jobs.worker_status import DONE, FAILED, FENCED, NO_SPACE, STOPPED, TAKEN
 
 
@@ -65,7 +65,7 @@ def _attempt(folder: JobFolder, owner: Owner, stop: threading.Event) -> int:
     try:
         compute(folder, owner, stop)
         status = DONE
-    except StoppedError:
+    except AttemptStoppedError:
         status = STOPPED
     except FencedError as error:
         status, message = FENCED, str(error)
@@ -95,7 +95,7 @@ def _explain(error: Exception) -> str:
 def compute(folder: JobFolder, owner: Owner, stop: threading.Event) -> None:
     """Run the computation from its last checkpoint and publish the result.
 
-    Raises StoppedError, FencedError, and whatever the computation raises.
+    Raises AttemptStoppedError, FencedError, and whatever the computation raises.
     """
     order = folder.order()
     kind = kinds.load(order["kind"])
@@ -107,9 +107,9 @@ def compute(folder: JobFolder, owner: Owner, stop: threading.Event) -> None:
     shutil.rmtree(staging, ignore_errors=True)
     make_folder(output)
     experiment = Path(order["experiment"]) if order["experiment"] else None
-    task = Task(folder=folder, owner=owner, experiment=experiment, output=output, stop=stop)
+    attempt = Attempt(folder=folder, owner=owner, experiment=experiment, output=output, stop=stop)
     try:
-        publish(task, kind.run(task, settings))
+        publish(attempt, kind.run(attempt, settings))
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import psutil
 
 from app.jobs.config import GIB, JobsConfig
-from app.jobs.local import LocalEngine
+from app.jobs.engines.local import LocalEngine
 from app.jobs.records import Job
 
 

@@ -59,11 +59,6 @@ class Dispatch:
             return None
         return Owner(attempt=attempt, token=token)
 
-    def owner_of(self, job: Job) -> Owner:
-        """Return the attempt that the ledger knows as the owner."""
-        row = self._store.rows("SELECT attempt, token FROM jobs WHERE id = ?", (job.id,))[0]
-        return Owner(attempt=row["attempt"], token=row["token"])
-
     def record_handle(self, job: str, attempt: int, handle: str) -> None:
         """Remember how the engine calls the attempt's process."""
         with self._store.transaction() as database:

@@ -15,12 +15,12 @@ from app.jobs import worker_status
 from app.jobs.admission import disk_shortage, memory_shortage
 from app.jobs.config import JobsConfig
 from app.jobs.dispatch import Dispatch
-from app.jobs.engine import Engine
 from app.jobs.engines import create_engine
+from app.jobs.engines.engine import Engine
+from app.jobs.engines.local import LocalEngine
 from app.jobs.errors import EngineError, JobError, LedgerError
 from app.jobs.folder import JobFolder, is_held, try_lock
 from app.jobs.ledger import Ledger
-from app.jobs.local import LocalEngine
 from app.jobs.records import Job
 from app.jobs.state import JobState
 from app.jobs.study import MOST_JOBS, keep_summary

@@ -9,7 +9,7 @@ from pathlib import Path
 from app.jobs import worker_status
 from app.jobs.config import JobsConfig
 from app.jobs.dispatch import Dispatch
-from app.jobs.engine import Engine, Launch, ProcessState
+from app.jobs.engines.engine import Engine, Launch, ProcessState
 from app.jobs.errors import EngineError
 from app.jobs.folder import JobFolder, is_held, read_json
 from app.jobs.records import Job

@@ -11,7 +11,7 @@ import pytest
 
 from app.jobs import EngineError, JobsConfig
 from app.jobs.config import RayConfig
-from app.jobs.ray import RayEngine
+from app.jobs.engines.ray import RayEngine
 from tests.cluster.story import check_cancel, check_lost_node, check_same_bits
 
 SCRIPT = Path(__file__).with_name("ray.sh")

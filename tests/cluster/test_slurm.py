@@ -10,8 +10,8 @@ import pytest
 
 from app.jobs import EngineError, JobsConfig
 from app.jobs.config import SlurmConfig
-from app.jobs.engine import Launch
-from app.jobs.slurm import SlurmEngine
+from app.jobs.engines.engine import Launch
+from app.jobs.engines.slurm import SlurmEngine
 from tests.cluster.story import check_cancel, check_lost_node, check_same_bits
 
 SCRIPT = Path(__file__).with_name("slurm.sh")

@@ -12,8 +12,8 @@ from app.api.wire.bodies import body
 from app.api.wire.strict import Identifier, Strict
 from app.api.wire.volumes import pack
 from app.jobs import Job, JobSpec, JobState, kinds
+from app.jobs.attempt import PLANE_FILE
 from app.jobs.folder import JobFolder
-from app.jobs.task import PLANE_FILE
 
 router = APIRouter(tags=["jobs"])
 NUMBERS = body("application/octet-stream", "Little-endian float32 in C order, along x then z.")

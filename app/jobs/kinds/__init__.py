@@ -2,7 +2,7 @@
 
     EXPERIMENT: bool                         whether it needs an experiment folder
     read(settings) -> Settings               BadInputError for a setting that it refuses; cheap to import
-    run(task, settings) -> dict              the computation; returns the summary in the result
+    run(attempt, settings) -> dict              the computation; returns the summary in the result
     target(job, folder) -> Path              where the finished folder goes (optional; default: in the job)
 
 Names of kinds come from the modules found here, never from user text: `-` in a name is `_` in a module.

@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 
 from app.files.durable import durable_path
 from app.files.toml import Strict, parse
-from app.jobs.task import CheckpointClock, Task
+from app.jobs.attempt import Attempt, CheckpointClock
 
 EXPERIMENT = False
 
@@ -59,22 +59,22 @@ class _Sums:
         return float(np.sqrt(np.mean(self.square_px2 / self.trials - (self.shift_px / self.trials) ** 2)))
 
 
-def run(task: Task, study: NoiseStudy) -> dict[str, Any]:
+def run(attempt: Attempt, study: NoiseStudy) -> dict[str, Any]:
     """Run the trials; return the scatter and the bias in pixels, with the scatter that is stated."""
     reference, shifted = _frames(study)
-    sums = _resume(task.checkpoints, study)
+    sums = _resume(attempt.checkpoints, study)
     clock = CheckpointClock()
     while sums.trials < study.trials:
         sums = _add_trial(sums, reference, shifted, study)
-        if task.stop.is_set() or clock.is_due():
+        if attempt.stop.is_set() or clock.is_due():
             with clock.measure():
-                _save(task.checkpoints, sums)
-            task.progress(sums.trials, study.trials, {"scatter_px": sums.scatter_px()})
-            task.check_stop()
-    task.progress(sums.trials, study.trials, {"scatter_px": sums.scatter_px()})
+                _save(attempt.checkpoints, sums)
+            attempt.progress(sums.trials, study.trials, {"scatter_px": sums.scatter_px()})
+            attempt.check_stop()
+    attempt.progress(sums.trials, study.trials, {"scatter_px": sums.scatter_px()})
     mean_px = sums.shift_px / study.trials
-    np.save(task.output / "mean_px.npy", mean_px)
-    np.save(task.output / "variance_px2.npy", sums.square_px2 / study.trials - mean_px**2)
+    np.save(attempt.output / "mean_px.npy", mean_px)
+    np.save(attempt.output / "variance_px2.npy", sums.square_px2 / study.trials - mean_px**2)
     return {
         "settings": study.model_dump(),
         "scatter_px": sums.scatter_px(),

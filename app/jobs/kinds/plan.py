@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import Field
 
 from app.files.toml import Strict, parse
-from app.jobs.task import Task
+from app.jobs.attempt import Attempt
 
 EXPERIMENT = True
 
@@ -22,14 +22,14 @@ def read(settings: Mapping[str, Any]) -> PlanSettings:
     return parse(dict(settings), PlanSettings, source="the settings of a plan")
 
 
-def run(task: Task, settings: PlanSettings) -> dict[str, Any]:
+def run(attempt: Attempt, settings: PlanSettings) -> dict[str, Any]:
     """Plan; return the verdicts."""
     # Imported here: reading a job's settings must not cost the start of the array library.
     from app.plan.make import plan
 
     def on_stage(stage: str) -> None:
-        task.check_stop()
-        task.tell("stage", {"stage": stage})
+        attempt.check_stop()
+        attempt.tell("stage", {"stage": stage})
 
-    made = plan(task.experiment_folder(), excess_k=settings.excess_k, on_stage=on_stage)
+    made = plan(attempt.experiment_folder(), excess_k=settings.excess_k, on_stage=on_stage)
     return {"verdicts": made.verdicts}

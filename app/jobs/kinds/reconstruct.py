@@ -13,8 +13,8 @@ from typing import Any
 from pydantic import Field
 
 from app.files.toml import Strict, parse
+from app.jobs.attempt import Attempt
 from app.jobs.checkpoints import FolderStore
-from app.jobs.task import Task
 
 EXPERIMENT = True
 
@@ -37,39 +37,39 @@ def target(order: Mapping[str, Any], folder: Path) -> Path:
     return Path(order["experiment"]) / "results" / f"{moment}-{preset}-{folder.name}"
 
 
-def run(task: Task, settings: ReconstructSettings) -> dict[str, Any]:
+def run(attempt: Attempt, settings: ReconstructSettings) -> dict[str, Any]:
     """Reconstruct; return how it ended."""
     # Imported here: reading a job's settings must not cost the start of the array library.
     from app.pipeline import reconstruct
     from core.result import Outcome
 
     def on_stage(stage: str) -> None:
-        task.check_stop()
-        task.tell("stage", {"stage": stage})
+        attempt.check_stop()
+        attempt.tell("stage", {"stage": stage})
 
     told = itertools.count(1)
 
     def on_event(row: Mapping[str, Any]) -> None:
         if "excess_plane_k" in row:
-            task.show(row["excess_plane_k"])
+            attempt.show(row["excess_plane_k"])
         numbers = {name: float(value) for name, value in row.items() if isinstance(value, int | float)}
         if numbers:
             # A march has no steps of equal worth: its rows are counted.
             step = int(numbers.pop("step", numbers.pop("iteration", 0))) or next(told)
-            task.progress(step, int(numbers.pop("steps", 0)), numbers)
+            attempt.progress(step, int(numbers.pop("steps", 0)), numbers)
 
     done = reconstruct(
-        task.experiment_folder(),
+        attempt.experiment_folder(),
         settings.preset,
         on_stage=on_stage,
         on_event=on_event,
-        into=task.output,
-        store=FolderStore(task.checkpoints),
-        should_stop=task.stop.is_set,
+        into=attempt.output,
+        store=FolderStore(attempt.checkpoints),
+        should_stop=attempt.stop.is_set,
     )
     if done.solution.outcome is Outcome.stopped:
-        task.check_stop()
+        attempt.check_stop()
     warm_k = done.solution.temperature_k
     ambient_k = done.measurement.problem.scene.air.ambient_temperature_k
-    task.show((warm_k[:, warm_k.shape[1] // 2] - ambient_k).astype("float32"), last=True)
+    attempt.show((warm_k[:, warm_k.shape[1] // 2] - ambient_k).astype("float32"), last=True)
     return {"preset": settings.preset, "outcome": done.solution.outcome.name}

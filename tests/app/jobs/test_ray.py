@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from app.jobs.config import RayConfig
+from app.jobs.engines.ray import RayEngine
 from app.jobs.errors import EngineError
-from app.jobs.ray import RayEngine
 
 
 class OpenHead(http.server.BaseHTTPRequestHandler):

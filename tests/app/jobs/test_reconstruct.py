@@ -11,8 +11,8 @@ from app.cli import create_cli
 from app.errors import BadInputError
 from app.experiment.results import read_result
 from app.jobs import JobSpec, Ledger
+from app.jobs.attempt import PLANE_FILE, AttemptStoppedError
 from app.jobs.folder import JobFolder, Owner
-from app.jobs.task import PLANE_FILE, StoppedError
 from app.pipeline import reconstruct
 
 
@@ -57,7 +57,7 @@ def test_a_stopped_job_leaves_no_result_and_an_order_without_experiment_is_refus
     ledger, stop = Ledger(tmp_path), threading.Event()
     folder, owner = begun(ledger, experiment)
     stop.set()
-    with pytest.raises(StoppedError):
+    with pytest.raises(AttemptStoppedError):
         worker.compute(folder, owner, stop)
     assert not folder.is_published()
     with pytest.raises(BadInputError, match="works on an experiment"):

@@ -15,9 +15,9 @@ import psutil
 import pytest
 
 from app.jobs import FencedError, Job, JobError, JobsConfig, JobSpec, JobState, Ledger, Supervisor
+from app.jobs.attempt import Attempt, publish
 from app.jobs.dispatch import Dispatch
 from app.jobs.folder import JobFolder, Owner, is_held
-from app.jobs.task import Task, publish
 
 QUICK = {"poll_s": 0.05, "retry_first_s": 0.1, "memory_reserve_bytes": 0, "disk_reserve_bytes": 0}
 
@@ -135,7 +135,7 @@ def test_a_silent_worker_is_replaced_and_can_never_publish(ledger: Ledger):
         stopped.suspend()
         until(lambda: ledger.get(slow.id).attempt == 2)
     folder = JobFolder(ledger.folder_of(slow.id))
-    old = Task(
+    old = Attempt(
         folder=folder, owner=Owner(1, "whatever it was"), experiment=None, output=folder.path / ".late.tmp"
     )
     old.output.mkdir()

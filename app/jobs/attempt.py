@@ -22,12 +22,12 @@ PLANE_FILE = "plane.npy"
 SHOWN_EVERY_S = 1.0
 
 
-class StoppedError(Exception):
+class AttemptStoppedError(Exception):
     """The computation has written its checkpoint and ends, as it was asked to."""
 
 
 @dataclass(frozen=True)
-class Task:
+class Attempt:
     """One attempt at one job, as its computation sees it."""
 
     folder: JobFolder
@@ -67,9 +67,9 @@ class Task:
             temporary.replace(path)
 
     def check_stop(self) -> None:
-        """Raise StoppedError when the job was asked to stop. Call it after writing a checkpoint."""
+        """Raise AttemptStoppedError when the job was asked to stop. Call it after writing a checkpoint."""
         if self.stop.is_set():
-            raise StoppedError
+            raise AttemptStoppedError
 
 
 class CheckpointClock:
@@ -117,12 +117,12 @@ def inherit_checkpoint(folder: JobFolder, number: int) -> None:
     make_folder(own)
 
 
-def publish(task: Task, summary: Mapping[str, Any]) -> None:
+def publish(attempt: Attempt, summary: Mapping[str, Any]) -> None:
     """Put the finished folder in place by one rename. Raises FencedError when replaced."""
-    write_json(task.output / "result.json", {"summary": dict(summary)})
-    with task.folder.locked():
-        task.folder.check(task.owner)
-        publish_folder(task.output, task.folder.target())
+    write_json(attempt.output / "result.json", {"summary": dict(summary)})
+    with attempt.folder.locked():
+        attempt.folder.check(attempt.owner)
+        publish_folder(attempt.output, attempt.folder.target())
 
 
 def _entries(folder: Path) -> list[Path]:

@@ -12,7 +12,7 @@ from typing import Any
 import httpx
 
 from app.jobs.config import RayConfig
-from app.jobs.engine import Launch, ProcessState
+from app.jobs.engines.engine import Launch, ProcessState
 from app.jobs.errors import EngineError
 
 _STATES = {

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import psutil
 
-from app.jobs.engine import Launch, ProcessState
+from app.jobs.engines.engine import Launch, ProcessState
 from app.jobs.errors import EngineError
 from app.jobs.folder import JobFolder, read_json
 

@@ -4,7 +4,7 @@ import shlex
 import subprocess
 
 from app.jobs.config import SlurmConfig
-from app.jobs.engine import Launch, ProcessState
+from app.jobs.engines.engine import Launch, ProcessState
 from app.jobs.errors import EngineError
 from app.jobs.folder import JobFolder
 

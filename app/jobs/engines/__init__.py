@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from app.jobs.config import JobsConfig
-from app.jobs.engine import Engine
-from app.jobs.local import LocalEngine
-from app.jobs.ray import RayEngine
-from app.jobs.slurm import SlurmEngine
+from app.jobs.engines.engine import Engine
+from app.jobs.engines.local import LocalEngine
+from app.jobs.engines.ray import RayEngine
+from app.jobs.engines.slurm import SlurmEngine
 
 
 def create_engine(config: JobsConfig, folder: Path) -> Engine:
