@@ -20,11 +20,11 @@ from scipy.interpolate import CubicSpline
 
 from app.errors import AirlensError
 from core.result import Outcome
-from core.room.boundary import Boundary, WallPlane, closed_room
 from core.room.closure import ConstantClosure
-from core.room.grid import RoomGrid
 from core.room.march import MarchSettings, march
-from core.room.model import RoomModel, air_at_rest, room_model
+from core.room.room_grid import RoomGrid
+from core.room.step import RoomModel, air_at_rest, room_model
+from core.room.wall_planes import Boundary, WallPlane, closed_room
 
 PUBLISHED_NUSSELT = {1e4: 2.243, 1e5: 4.519, 1e6: 8.800}
 PUBLISHED_LEAST_U = {100.0: -0.21090, 400.0: -0.32726, 1000.0: -0.38289}
@@ -143,7 +143,7 @@ def _square(cells: int) -> tuple[RoomGrid, Boundary]:
     edge = 1.0 / cells
     grid = RoomGrid(cells=(cells, 2, cells), lower_m=(0.0, 0.0, 0.0), spacing_m=(edge, edge, edge))
     x, y, z = closed_room(grid).walls
-    low, high = (eqx.tree_at(lambda w: w.grip, wall, jnp.float32(0.0)) for wall in y)
+    low, high = (eqx.tree_at(lambda w: w.no_slip, wall, jnp.float32(0.0)) for wall in y)
     return grid, Boundary((x, (low, high), z))
 
 
@@ -152,7 +152,7 @@ def _half_cube(cells: int, deep: int) -> tuple[RoomGrid, Boundary]:
     edge = 1.0 / cells
     grid = RoomGrid(cells=(cells, deep, cells), lower_m=(0.0, 0.0, 0.0), spacing_m=(edge, edge, edge))
     x, y, z = closed_room(grid).walls
-    free = eqx.tree_at(lambda w: w.grip, y[1], jnp.float32(0.0))
+    free = eqx.tree_at(lambda w: w.no_slip, y[1], jnp.float32(0.0))
     return grid, Boundary((x, (y[0], free), z))
 
 

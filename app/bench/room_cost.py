@@ -21,14 +21,14 @@ from app.volume.file import RoomVolume, read_volume
 from app.volume.measurement import known_planes
 from app.volume.scene import RigOptions, room_scene
 from app.volume.score import score_solution
-from core.estimate.forward_runs import Attempt, RoomSettings, attempt, first_profile_k, perturbed
+from core.estimate.forward_runs import ForwardRun, RoomSettings, first_profile_k, march_under, perturbed
 from core.estimate.prior import Prior, room_prior
 from core.problem import Problem
 from core.result import Solution
 from core.room.forward import Room, carried_over, closure_name, room
-from core.room.grid import AXES
 from core.room.march import MarchSettings, march
-from core.room.model import Flow
+from core.room.room_grid import AXES
+from core.room.step import Flow
 
 _VERTICES = (64, 64, 64)
 
@@ -62,7 +62,7 @@ def cost_row(volume: RoomVolume, cells: int, *, jacobian: bool) -> dict[str, flo
     start = where.at_rest(where.model(prior.mean), first_profile_k(problem, where))
     compile_s = _compiled(where, prior, start)
     began_s = time.process_time()
-    base = attempt(where, prior.mean, start, settings.settle_s, _VERTICES, _quiet)
+    base = march_under(where, prior.mean, start, settings.settle_s, _VERTICES, _quiet)
     run_s = time.process_time() - began_s
     row: dict[str, float | str] = {
         "cells": "x".join(str(where.grid.cells[a]) for a in AXES),
@@ -88,9 +88,9 @@ def _from_coarse(
     start = coarse.at_rest(coarse.model(prior.mean), first_profile_k(problem, coarse))
     _compiled(coarse, prior, start)
     began_s = time.process_time()
-    settled = attempt(coarse, prior.mean, start, settings.settle_s, _VERTICES, _quiet)
-    flow = carried_over(settled.flow.last, coarse.grid, where.grid)
-    base = attempt(where, prior.mean, flow, settings.refine_s, _VERTICES, _quiet)
+    start_run = march_under(coarse, prior.mean, start, settings.settle_s, _VERTICES, _quiet)
+    flow = carried_over(start_run.flow.last, coarse.grid, where.grid)
+    base = march_under(where, prior.mean, flow, settings.refine_s, _VERTICES, _quiet)
     return {"from_coarse_cpu_s": time.process_time() - began_s, "from_coarse_u_rel": _error(base, volume)}
 
 
@@ -107,11 +107,11 @@ def _compiled(where: Room, prior: Prior, start: Flow) -> float:
     return time.process_time() - began_s
 
 
-def _error(found: Attempt, volume: RoomVolume) -> float:
+def _error(found: ForwardRun, volume: RoomVolume) -> float:
     """u's error over its rms."""
-    seen, axes = found.seen, (volume.x_m, volume.y_m, volume.z_m)
+    fields, axes = found.fields, (volume.x_m, volume.y_m, volume.z_m)
     x, y, z = (np.linspace(axis[0], axis[-1], n) for axis, n in zip(axes, _VERTICES, strict=True))
-    there = Solution(x, y, z, volume.ambient_k + seen.excess_k, seen.pressure_m2_s2, seen.velocity_m_s)
+    there = Solution(x, y, z, volume.ambient_k + fields.excess_k, fields.pressure_m2_s2, fields.velocity_m_s)
     return float(score_solution(there, volume)["u"]["rel"])
 
 
@@ -120,7 +120,7 @@ def _quiet(_: dict[str, float]) -> None:
 
 
 def _derivatives(
-    where: Room, prior: Prior, base: Attempt, settings: RoomSettings, run_s: float
+    where: Room, prior: Prior, base: ForwardRun, settings: RoomSettings, run_s: float
 ) -> dict[str, float]:
     """Cost of the prior's derivatives scaled to six, over one run, and the gain of a second thread."""
     vector = np.zeros(len(prior.active()))

@@ -97,9 +97,9 @@ def entered(problem: Problem, wrong: float, closure: str) -> Problem:
 
 def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dict[str, Any]:
     """Solve; errors, coverage, processor seconds, and what was said."""
-    told: list[dict[str, float]] = []
+    reported: list[dict[str, float]] = []
     began_s = time.process_time()
-    solution = solve_room(problem, settings, on_event=told.append)
+    solution = solve_room(problem, settings, on_event=reported.append)
     cpu_s = time.process_time() - began_s
     scores = score_solution(solution, volume)
     return {
@@ -108,7 +108,7 @@ def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dic
         "T_departure": scores["T"]["departure_of_departures"],
         "p_departure": scores["p"]["rel_departure"],
         **coverage(solution, volume),
-        **{name: value for event in told for name, value in event.items() if name.startswith("supply_")},
+        **{name: value for event in reported for name, value in event.items() if name.startswith("supply_")},
         "cpu_s": cpu_s,
         "wall_s": solution.solver_s,
         "outcome": solution.outcome.name,

@@ -16,12 +16,12 @@ import numpy as np
 import typer
 from jaxtyping import Float
 
-from core.room.boundary import Boundary, WallPlane, closed_room
 from core.room.closure import AbstractClosure, KEpsilonClosure, ZeroEquationClosure, wall_distance_m
-from core.room.grid import RoomGrid
 from core.room.k_epsilon import C_MU, NOMINAL_HEAT_M_S
 from core.room.march import MarchSettings, march
-from core.room.model import Flow, RoomModel, air_at_rest, room_model
+from core.room.room_grid import RoomGrid
+from core.room.step import Flow, RoomModel, air_at_rest, room_model
+from core.room.wall_planes import Boundary, WallPlane, closed_room
 
 Closure = Literal["k_epsilon", "zero_equation"]
 CLOSURES: tuple[Closure, ...] = ("k_epsilon", "zero_equation")
@@ -200,7 +200,7 @@ def _tall_walls(grid: RoomGrid, closure: Closure) -> Boundary:
 
 
 def _free(wall: WallPlane) -> WallPlane:
-    return eqx.tree_at(lambda w: w.grip, wall, jnp.float32(0.0))
+    return eqx.tree_at(lambda w: w.no_slip, wall, jnp.float32(0.0))
 
 
 def _closure(name: Closure, grid: RoomGrid, molecular_m2_s: float) -> AbstractClosure:

@@ -10,8 +10,8 @@ from jaxtyping import Float
 from core.estimate.plane_openings import air_planes, still_vertices
 from core.problem import Problem
 from core.room.boundary_conditions import RoomLayout
-from core.room.grid import WALLS
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
+from core.room.room_grid import WALLS
 from core.scene import Outlet
 
 # 1.6 W/m2K over rho c.

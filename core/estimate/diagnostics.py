@@ -71,7 +71,7 @@ def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
     return [
         f"The images ask for {'heat' if by_k > 0 else 'cold'} that is not in the scene: as of a floor panel of "
         f"{size} m, {abs(by_k):.0f} K {'warmer' if by_k > 0 else 'colder'} than the air, at x = {lower[0]:.1f} to "
-        f"{upper[0]:.1f} m. How deep in the room it is one view does not tell: half-way was taken. State it as a "
+        f"{upper[0]:.1f} m. How deep in the room it is one view does not report: half-way was taken. State it as a "
         "heater."
     ]
 

@@ -20,7 +20,7 @@ from scipy.linalg import block_diag
 
 from core.estimate.least_squares import spread
 from core.estimate.observation import IMAGES, PLANES, Observations, ShiftBlocks
-from core.room.grid import AXES, WALLS
+from core.room.room_grid import AXES, WALLS
 from core.room.vertices import linear_matrix
 
 # Neighbouring data err together: so many count as one.

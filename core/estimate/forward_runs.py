@@ -9,15 +9,15 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from core.estimate.balance import outflow_excess_k
-from core.estimate.observation import Prediction
 from core.estimate.plane_openings import air_planes, still_vertices
 from core.estimate.prior import WALL_PARAMETERS, Prior
 from core.problem import Problem
-from core.room.boundary import set_normal
 from core.room.boundary_conditions import RoomParameters
-from core.room.forward import Room, room, seen
+from core.room.forward import Room, room, room_fields
 from core.room.march import March, MarchSettings, march
-from core.room.model import Flow
+from core.room.step import Flow
+from core.room.vertices import RoomFields
+from core.room.wall_planes import set_normal
 from core.scene import Inlet
 from core.setting import check_range, setting
 
@@ -57,10 +57,10 @@ class RoomSettings:
     rounds: int = 8
     coarse_rounds: int = 6
     coarse_step: float = 1.0
-    worthwhile: float = 0.85
-    straight: float = 4.0
-    straight_walls: float = 1.5
-    again: int = 2
+    least_gain: float = 0.85
+    jacobian_valid: float = 4.0
+    jacobian_valid_walls: float = 1.5
+    renewals: int = 2
     fine_step: float = 0.3
     settle_s: float = 150.0
     restart_s: float = 60.0
@@ -75,22 +75,22 @@ class RoomSettings:
         check_range("wall_heat", self.wall_heat, 0.01, 100.0, "", "1 takes what the heat balance gives.")
 
 
-class Attempt(eqx.Module):
+class ForwardRun(eqx.Module):
     """One march of a room: its parameters, how it went, and what measurements would see."""
 
     parameters: RoomParameters
     flow: March
-    seen: Prediction
+    fields: RoomFields
 
 
 class Derivatives(eqx.Module):
     """A room as it is, and with one parameter after the other moved by `steps` prior deviations."""
 
-    start: Prediction
-    moved: list[Prediction]
+    start: RoomFields
+    moved: list[RoomFields]
     steps: Float[np.ndarray, " active"]
 
-    def per_deviation(self, read: Callable[[Prediction], ArrayLike]) -> Float[np.ndarray, "active ..."]:
+    def per_deviation(self, read: Callable[[RoomFields], ArrayLike]) -> Float[np.ndarray, "active ..."]:
         """Change of what `read` takes from a room, per prior deviation of each parameter."""
         before = np.asarray(read(self.start))
         changes = [
@@ -99,18 +99,18 @@ class Derivatives(eqx.Module):
         return np.stack(changes) if changes else np.zeros((0, *before.shape))
 
 
-def settled(
+def run_as_stated(
     coarse: Room,
     prior: Prior,
     problem: Problem,
     settings: RoomSettings,
     vertices: tuple[int, int, int],
-    tell: Event,
-) -> Attempt:
+    report: Event,
+) -> ForwardRun:
     """The coarse room as stated, marched from a measured profile or the leaving air's temperature."""
     model = coarse.model(prior.mean)
     flow = coarse.at_rest(model, first_profile_k(problem, coarse))
-    return attempt(coarse, prior.mean, flow, settings.settle_s, vertices, tell)
+    return march_under(coarse, prior.mean, flow, settings.settle_s, vertices, report)
 
 
 def first_profile_k(problem: Problem, coarse: Room) -> Float[np.ndarray, " nz"]:
@@ -129,52 +129,52 @@ def first_profile_k(problem: Problem, coarse: Room) -> Float[np.ndarray, " nz"]:
     return np.full(len(heights), leaving)
 
 
-def attempt(
+def march_under(
     where: Room,
     parameters: RoomParameters,
     flow: Flow,
     seconds: float,
     vertices: tuple[int, int, int],
-    tell: Event,
+    report: Event,
     *,
     held_k: Float[np.ndarray, " layers"] | None = None,
-) -> Attempt:
+) -> ForwardRun:
     """March `flow` under these parameters and look at its mean; seconds are those of the reference room.
 
     Layers, or the room, are kept at the mean excess temperatures `held_k` where those are given.
     """
     model = where.model(parameters)
     flow = eqx.tree_at(lambda f: f.velocity, flow, set_normal(flow.velocity, model.boundary))
-    pace = where.pace
+    turnover_ratio = where.turnover_ratio
     timing = MarchSettings(
-        longest_s=seconds * pace,
-        least_s=min(seconds, _RESPONSE_S) * pace,
-        window_s=min(5.0, seconds) * pace,
-        settle_s=0.15 * seconds * pace,
-        level_ahead_s=20.0 * pace,
+        longest_s=seconds * turnover_ratio,
+        least_s=min(seconds, _RESPONSE_S) * turnover_ratio,
+        window_s=min(5.0, seconds) * turnover_ratio,
+        settle_s=0.15 * seconds * turnover_ratio,
+        level_ahead_s=20.0 * turnover_ratio,
         most_steps=round(_STEPS * float(np.prod(where.grid.cells)) ** (1 / 3) * seconds),
     )
     held = None if held_k is None else jnp.asarray(held_k, jnp.float32)
-    done = march(flow, model, timing, held_k=held, on_window=tell)
-    return Attempt(parameters, done, seen(done.mean, model, vertices))
+    done = march(flow, model, timing, held_k=held, on_window=report)
+    return ForwardRun(parameters, done, room_fields(done.mean, model, vertices))
 
 
 def perturbed(
     where: Room,
     prior: Prior,
     vector: Float[np.ndarray, " active"],
-    base: Attempt,
+    base: ForwardRun,
     settings: RoomSettings,
     vertices: tuple[int, int, int],
 ) -> Derivatives:
     """The settled room again, first as it is and then with one parameter moved after the other."""
     sizes = differences(prior)
 
-    def one(step: Float[np.ndarray, " active"]) -> Prediction:
+    def one(step: Float[np.ndarray, " active"]) -> RoomFields:
         quiet: Event = lambda _: None  # noqa: E731
-        return attempt(
+        return march_under(
             where, prior.parameters(vector + step), base.flow.last, settings.restart_s, vertices, quiet
-        ).seen
+        ).fields
 
     with ThreadPoolExecutor(settings.threads) as pool:
         start, *moved = pool.map(one, [np.zeros(len(sizes)), *np.diag(sizes)])
@@ -193,15 +193,15 @@ def other_closure(where: Room) -> str:
     return "constant" if where.closure == "zero_equation" else "zero_equation"
 
 
-def otherwise_closed(
+def run_under_other_closure(
     where: Room,
     parameters: RoomParameters,
-    base: Attempt,
+    base: ForwardRun,
     settings: RoomSettings,
     vertices: tuple[int, int, int],
-) -> Prediction:
+) -> RoomFields:
     """The settled room again under another closure: what turbulence modelling leaves open."""
     last = base.flow.last
     flow = Flow(last.velocity, last.excess_k, last.pressure_m2_s2, None)
     another = room(where.scene, settings.coarse_cells, other_closure(where))
-    return attempt(another, parameters, flow, settings.restart_s, vertices, lambda _: None).seen
+    return march_under(another, parameters, flow, settings.restart_s, vertices, lambda _: None).fields

@@ -7,7 +7,7 @@ the coarse room is marched with one heater after the other giving less, or more,
 import numpy as np
 from jaxtyping import Float
 
-from core.estimate.forward_runs import Attempt, Event, RoomSettings, attempt
+from core.estimate.forward_runs import Event, ForwardRun, RoomSettings, march_under
 from core.estimate.observation import Observations
 from core.estimate.parameter_step import Vector, misfit_ratio
 from core.estimate.prior import Prior
@@ -21,21 +21,21 @@ def heaters_by_march(
     coarse: Room,
     prior: Prior,
     data: Observations,
-    base: Attempt,
+    base: ForwardRun,
     offset: Float[np.ndarray, " data"],
     settings: RoomSettings,
-    tell: Event,
-) -> tuple[Vector, Attempt]:
+    report: Event,
+) -> tuple[Vector, ForwardRun]:
     """Parameters in prior deviations, zero but for heaters' coefficients, and the coarse room under them."""
 
-    def climbed(n: int, way: float, vector: Vector, base: Attempt) -> tuple[Vector, Attempt]:
+    def climbed(n: int, way: float, vector: Vector, base: ForwardRun) -> tuple[Vector, ForwardRun]:
         for _ in range(_FARTHEST):
             moved = vector.copy()
             moved[n] += way
             where, flow = prior.parameters(moved), base.flow.last
-            tried = attempt(coarse, where, flow, settings.restart_s, data.vertices, lambda _: None)
+            tried = march_under(coarse, where, flow, settings.restart_s, data.vertices, lambda _: None)
             left = misfit_ratio(data, tried, base, offset)
-            tell({prior.names()[n]: float(moved[n]), "misfit_left": left})
+            report({prior.names()[n]: float(moved[n]), "misfit_left": left})
             if left >= 1.0:
                 break
             vector, base = moved, tried

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from core.estimate.observation import IMAGES, PLANES
 
-# Neighbours err together, and errors of grid and closure reach over whole jets: so many data count as one.
+# Neighbours err together, and errors of grid and closure trust_radius over whole jets: so many data count as one.
 _COHERENT = 12.0
 _STUDENT_NU = 3.0
 LONGEST_STEP = 3.0
@@ -33,29 +33,29 @@ def gauss_newton(
     residual: Float[np.ndarray, " data"],
     variance: Float[np.ndarray, " data"],
     jacobian: Float[np.ndarray, "data active"],
-    firm: Bool[np.ndarray, " active"],
+    gaussian: Bool[np.ndarray, " active"],
     *,
-    trusting: bool = False,
-    reach: float | None = None,
+    all_gaussian: bool = False,
+    trust_radius: float | None = None,
 ) -> Posterior:
     """One step from `vector`, where the data minus the prediction is `residual`.
 
     Few parameters' steps are cut one by one, which lets an entry that is far off move all the way. Many
-    that make up for one another would no longer do so: they are damped until none moves by more than `reach`.
+    that make up for one another would no longer do so: they are damped until none moves by more than `trust_radius`.
 
-    `firm` parameters keep a Gaussian prior; `trusting` keeps that of all: for first steps, when the model is
+    `gaussian` parameters keep a Gaussian prior; `all_gaussian` keeps that of all: for first steps, when the model is
     still far from the data.
     """
     new, normal, prior = vector, np.eye(len(vector)), np.ones(len(vector))
     for _ in range(6):
         student = (_STUDENT_NU + 1.0) / (_STUDENT_NU + new**2)
-        prior = np.where(firm | trusting, 1.0, student)
+        prior = np.where(gaussian | all_gaussian, 1.0, student)
         normal = (jacobian.T / variance) @ jacobian + np.diag(prior)
         gradient = (jacobian.T / variance) @ residual - prior * vector
-        if reach is None:
+        if trust_radius is None:
             new = vector + np.clip(np.linalg.solve(normal, gradient), -LONGEST_STEP, LONGEST_STEP)
         else:
-            new = vector + damped(normal, gradient, reach)
+            new = vector + damped(normal, gradient, trust_radius)
     data = normal - np.diag(prior)
     # A parameter that was let go is no more certain than its prior, were there no data; one near it no less.
     return Posterior(new, np.linalg.inv(data + np.eye(len(new))), np.sqrt(variance))
@@ -84,7 +84,7 @@ def weighted_variance(
 
     The representation error of a kind of data is what two grids differ by, or the misfit where that is less. `far`
     from the truth the images' derivatives are no better than their misfit: all of it counts, so that they ask for no
-    more than they can tell, and a stated supply or a thermometer holds against them.
+    more than they can report, and a stated supply or a thermometer holds against them.
     """
     total = np.zeros_like(variance)
     for g in np.unique(group):

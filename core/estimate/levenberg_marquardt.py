@@ -9,11 +9,11 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from core.estimate.forward_runs import Attempt, Derivatives, Event, RoomSettings, attempt
+from core.estimate.forward_runs import Derivatives, Event, ForwardRun, RoomSettings, march_under
 from core.estimate.least_squares import LONGEST_STEP, Posterior
 from core.estimate.observation import Observations
 from core.estimate.parameter_fit import GAIN, PATIENCE, Fit
-from core.estimate.parameter_step import Jacobian, Vector, corrected, farthest, fitted, misfit_ratio, secant
+from core.estimate.parameter_step import Jacobian, Vector, by_name, corrected, farthest, misfit_ratio, secant
 from core.estimate.prior import Prior
 from core.room.forward import Room
 
@@ -22,38 +22,38 @@ def fine_search(
     fine: Room,
     prior: Prior,
     data: Observations,
-    first: Attempt,
+    first: ForwardRun,
     derivatives: Derivatives,
-    made_again: Callable[[Vector], Derivatives],
+    renewed: Callable[[Vector], Derivatives],
     settings: RoomSettings,
-    tell: Event,
+    report: Event,
 ) -> tuple[Fit, Derivatives]:
     """The fine room's parameters and best march, and the last derivatives.
 
     Steps are damped, a room that is farther from the data than the one before is not gone on from, and every march
-    corrects the Jacobian. Derivatives are `made_again` after every other round that moved far, and where the old
-    ones have no more to say, `settings.again` times.
+    corrects the Jacobian. Derivatives are `renewed` after every other round that moved far, and where the old
+    ones have no more to say, `settings.renewals` times.
     """
     linearised = np.zeros(len(prior.active()))
     best = Fit(Posterior(linearised, np.eye(len(linearised)), np.zeros(0)), first)
-    grid_difference = data.predicted(first.seen) - data.predicted(derivatives.start)
-    stale, again, reach = 0, settings.again, LONGEST_STEP
+    grid_difference = data.predicted(first.fields) - data.predicted(derivatives.start)
+    stale, renewals, trust_radius = 0, settings.renewals, LONGEST_STEP
     jacobian = derivatives.per_deviation(data.predicted).T
     for n in range(settings.rounds):
-        new = searched(fine, prior, data, best, jacobian, grid_difference, reach, settings, tell)
+        new = searched(fine, prior, data, best, jacobian, grid_difference, trust_radius, settings, report)
         left = misfit_ratio(data, new.room, best.room)
-        tell({"round": n + 1.0, "misfit_left": left, **fitted(prior, new.posterior.vector)})
-        change = data.predicted(new.room.seen) - data.predicted(best.room.seen)
+        report({"round": n + 1.0, "misfit_left": left, **by_name(prior, new.posterior.vector)})
+        change = data.predicted(new.room.fields) - data.predicted(best.room.fields)
         jacobian = secant(jacobian, new.posterior.vector - best.posterior.vector, change)
         step = farthest(new.posterior.vector, best.posterior.vector)
-        best, reach = (new, LONGEST_STEP) if left < 1.0 else (best.known_as(new), 0.5 * step)
+        best, trust_radius = (new, LONGEST_STEP) if left < 1.0 else (best.with_posterior_of(new), 0.5 * step)
         stale = 0 if left < GAIN else stale + 1
         done = step < settings.fine_step or stale == PATIENCE
-        enough = settings.fine_step if done else settings.straight_walls
+        enough = settings.fine_step if done else settings.jacobian_valid_walls
         away = farthest(best.posterior.vector, linearised)
-        if again > 0 and (done or n % 2 == 1) and away > enough:
-            again, linearised, stale, reach = again - 1, best.posterior.vector, 0, LONGEST_STEP
-            derivatives = made_again(linearised)
+        if renewals > 0 and (done or n % 2 == 1) and away > enough:
+            renewals, linearised, stale, trust_radius = renewals - 1, best.posterior.vector, 0, LONGEST_STEP
+            derivatives = renewed(linearised)
             jacobian = derivatives.per_deviation(data.predicted).T
         elif done:
             break
@@ -67,12 +67,14 @@ def searched(
     best: Fit,
     jacobian: Jacobian,
     grid_difference: Float[np.ndarray, " data"],
-    reach: float,
+    trust_radius: float,
     settings: RoomSettings,
-    tell: Event,
+    report: Event,
 ) -> Fit:
-    """One damped step from the best room, in which no parameter moves by more than `reach`, and its march."""
-    where, firm = best.posterior.vector, prior.firm()
-    asked = corrected(where, best.room, data, jacobian, grid_difference, firm=firm, reach=reach)
+    """One damped step from the best room, in which no parameter moves by more than `trust_radius`, and its march."""
+    where, gaussian = best.posterior.vector, prior.gaussian()
+    asked = corrected(
+        where, best.room, data, jacobian, grid_difference, gaussian=gaussian, trust_radius=trust_radius
+    )
     parameters, flow = prior.parameters(asked.vector), best.room.flow.last
-    return Fit(asked, attempt(fine, parameters, flow, settings.refine_s, data.vertices, tell))
+    return Fit(asked, march_under(fine, parameters, flow, settings.refine_s, data.vertices, report))

@@ -17,8 +17,8 @@ from core.geometry import Box
 from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.rays.operator import StraightRayOperator, build
 from core.rays.optics import pinhole
-from core.room.grid import AXES, WALLS
-from core.room.vertices import linear_matrix
+from core.room.room_grid import AXES, WALLS
+from core.room.vertices import RoomFields, linear_matrix
 from core.scene import Outlet, Scene
 
 _BLOCKS_ACROSS = 28
@@ -94,22 +94,13 @@ def _sees_the_middle(scene: Scene, view: int, centres_px: Float[np.ndarray, "win
     forward = np.where(direction[:, 1] > 1e-6, direction[:, 1], np.inf)
     reach = (scene.room.upper_m[1] - origin[1]) / forward
     point = origin + reach[:, None] * direction
-    seen = np.isfinite(forward)
+    inside = np.isfinite(forward)
     for a in (0, 2):
         margin = _WALL_MARGIN * scene.room.size_m[a]
-        seen &= (point[:, a] > scene.room.lower_m[a] + margin) & (
+        inside &= (point[:, a] > scene.room.lower_m[a] + margin) & (
             point[:, a] < scene.room.upper_m[a] - margin
         )
-    return seen
-
-
-class Prediction(eqx.Module):
-    """A room on its vertices, as measurements see it; `outflow_excess_k` is the mean over the outlets."""
-
-    excess_k: Float[np.ndarray, "vx vy vz"]
-    pressure_m2_s2: Float[np.ndarray, "vx vy vz"]
-    velocity_m_s: Float[np.ndarray, "vx vy vz 3"]
-    outflow_excess_k: float
+    return inside
 
 
 class Observations(eqx.Module):
@@ -143,7 +134,7 @@ class Observations(eqx.Module):
         group = np.concatenate([np.full(np.size(v), g) for v, _, g in parts] or [np.zeros(0)]).astype(int)
         return values, variance, group
 
-    def predicted(self, room: Prediction) -> Float[np.ndarray, " data"]:
+    def predicted(self, room: RoomFields) -> Float[np.ndarray, " data"]:
         """What this room would have shown, in the order of `values`."""
         refractivity = self.scene.air.excess_refractivity(jnp.asarray(room.excess_k, jnp.float32))
         parts = [b.predicted(refractivity).ravel() for b in self.shifts]

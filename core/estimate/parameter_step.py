@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from core.estimate.forward_runs import Attempt
+from core.estimate.forward_runs import ForwardRun
 from core.estimate.least_squares import Posterior, gauss_newton, weighted_variance
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior
@@ -14,32 +14,34 @@ Jacobian = Float[np.ndarray, "data active"]
 
 def corrected(
     vector: Vector,
-    best: Attempt,
+    best: ForwardRun,
     data: Observations,
     jacobian: Jacobian,
     grid_difference: Float[np.ndarray, " data"],
     *,
-    firm: Bool[np.ndarray, " active"],
+    gaussian: Bool[np.ndarray, " active"],
     offset: Float[np.ndarray, " data"] | float = 0.0,
-    trusting: bool = False,
-    reach: float | None = None,
+    all_gaussian: bool = False,
+    trust_radius: float | None = None,
 ) -> Posterior:
     """One Gauss-Newton step from `vector` by the misfit of `best`, `offset` added to what it shows.
 
-    One that may not reach farther than `reach` is a search's, still far from the truth.
+    One that may not trust_radius farther than `trust_radius` is a search's, still far from the truth.
     """
     values, variance, group = data.values()
-    residual = values - data.predicted(best.seen) - offset
-    weights = weighted_variance(variance, group, residual, grid_difference, far=reach is not None)
-    return gauss_newton(vector, residual, weights, jacobian, firm, trusting=trusting, reach=reach)
+    residual = values - data.predicted(best.fields) - offset
+    weights = weighted_variance(variance, group, residual, grid_difference, far=trust_radius is not None)
+    return gauss_newton(
+        vector, residual, weights, jacobian, gaussian, all_gaussian=all_gaussian, trust_radius=trust_radius
+    )
 
 
 def misfit_ratio(
-    data: Observations, new: Attempt, old: Attempt, offset: Float[np.ndarray, " data"] | float = 0.0
+    data: Observations, new: ForwardRun, old: ForwardRun, offset: Float[np.ndarray, " data"] | float = 0.0
 ) -> float:
     """Rms misfit of one attempt over another's, each kind of data weighted by the old one's."""
     values, variance, group = data.values()
-    after, before = (values - data.predicted(a.seen) - offset for a in (new, old))
+    after, before = (values - data.predicted(a.fields) - offset for a in (new, old))
     weights = weighted_variance(variance, group, before, before)
     return float(np.sqrt(np.sum(after**2 / weights) / max(np.sum(before**2 / weights), 1e-30)))
 
@@ -49,7 +51,7 @@ def farthest(one: Vector, other: Vector) -> float:
     return float(np.abs(one - other).max(initial=0.0))
 
 
-def fitted(prior: Prior, vector: Vector) -> dict[str, float]:
+def by_name(prior: Prior, vector: Vector) -> dict[str, float]:
     """Parameters by name, in deviations from their priors."""
     return dict(zip(prior.names(), (float(v) for v in vector), strict=True))
 

@@ -14,11 +14,11 @@ from scipy import ndimage
 
 from core.geometry import Vector2
 from core.problem import PlaneData, Problem
-from core.room.grid import WALLS
 from core.room.openings import stated_walls
+from core.room.room_grid import WALLS
 from core.scene import Heater, Inlet, Outlet, Patch
 
-# Patches slower than this share of the fastest flow through the plane are not told from rounding.
+# Patches slower than this share of the fastest flow through the plane are not reported from rounding.
 _SLOWEST = 0.05
 # Air slower than this share of the fastest in the plane is a wall's.
 _STILL = 0.02

@@ -7,15 +7,16 @@ from scipy.integrate import cumulative_trapezoid
 
 from core.air import GRAVITY_M_S2
 from core.estimate.diagnostics import balances, contradictions, misfit, undetermined
-from core.estimate.forward_runs import Attempt, Derivatives
+from core.estimate.forward_runs import Derivatives, ForwardRun
 from core.estimate.least_squares import Posterior
-from core.estimate.observation import IMAGES, Observations, Prediction
+from core.estimate.observation import IMAGES, Observations
 from core.estimate.prior import Prior
 from core.estimate.temperature_nudging import departure, free_vertices, last_correction, layer_means, unheld
 from core.estimate.uncertainty import Deviation, Represented, deviation
 from core.problem import Problem
 from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
+from core.room.vertices import RoomFields
 
 # Taken for the share of the images that is left unexplained where there are none.
 _UNSEEN_SHARE = 0.3
@@ -27,7 +28,7 @@ _DOUBT = 0.5
 _GUESSED_VISCOSITY = {"excess_k": 20.0, "pressure_m2_s2": 1.0, "velocity_m_s": 2.0}
 
 
-class Solved(eqx.Module):
+class Analysis(eqx.Module):
     """Everything that a solve leaves behind: what a solution and its deviations are made of.
 
     `coarse`, `first` (the fine room) and `other` (another closure) share their parameters. `before` is the room
@@ -39,76 +40,80 @@ class Solved(eqx.Module):
     prior: Prior
     posterior: Posterior
     derivatives: Derivatives
-    coarse: Prediction
-    first: Prediction
-    other: Prediction
-    before: Attempt
-    best: Attempt
+    coarse: RoomFields
+    first: RoomFields
+    other: RoomFields
+    before: ForwardRun
+    best: ForwardRun
     layout: RoomLayout
 
 
-def solution(solved: Solved, seconds: float, *, use_images: bool, notes: tuple[str, ...] = ()) -> Solution:
+def solution(
+    analysis: Analysis, seconds: float, *, use_images: bool, notes: tuple[str, ...] = ()
+) -> Solution:
     """The room as a result, with the temperature's last correction, deviations and sentences after `notes`."""
-    best, box, problem = solved.best, solved.problem.scene.room, solved.problem
-    local_k = departure(best.seen.excess_k)
-    free = free_vertices(solved.layout, best.seen.excess_k.shape)
-    start = unheld(best.seen, solved.before.seen, solved.data, solved.prior, free)
-    change = last_correction(solved.data, solved.prior, solved.derivatives, start)
+    best, box, problem = analysis.best, analysis.problem.scene.room, analysis.problem
+    local_k = departure(best.fields.excess_k)
+    free = free_vertices(analysis.layout, best.fields.excess_k.shape)
+    start = unheld(best.fields, analysis.before.fields, analysis.data, analysis.prior, free)
+    change = last_correction(analysis.data, analysis.prior, analysis.derivatives, start)
     x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(start.excess_k.shape))
     excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
-    moved_k = float(layer_means(excess - solved.before.seen.excess_k).mean())
+    moved_k = float(layer_means(excess - analysis.before.fields.excess_k).mean())
     before, after = (
         (v[:, None, :] + (_DOUBT * moved_k) ** 2) * free
         for v in (change.prior_variance_k2, change.variance_k2)
     )
     bent = bent_m4_s4(problem, z, before), bent_m4_s4(problem, z, after)
-    share = unexplained(solved.data, best.seen)
-    temperature = _deviation(solved, "excess_k", local_k, share, (before, after))
-    pressure = _deviation(solved, "pressure_m2_s2", departure(best.seen.pressure_m2_s2), share, bent)
-    velocity = _deviation(solved, "velocity_m_s", rms(best.seen.velocity_m_s), share)
+    share = unexplained(analysis.data, best.fields)
+    temperature = _deviation(analysis, "excess_k", local_k, share, (before, after))
+    pressure = _deviation(analysis, "pressure_m2_s2", departure(best.fields.pressure_m2_s2), share, bent)
+    velocity = _deviation(analysis, "velocity_m_s", rms(best.fields.velocity_m_s), share)
     return Solution(
         x,
         y,
         z,
         problem.scene.air.ambient_temperature_k + excess,
-        best.seen.pressure_m2_s2 + carried_m2_s2(problem, z, excess - best.seen.excess_k),
-        best.seen.velocity_m_s,
+        best.fields.pressure_m2_s2 + carried_m2_s2(problem, z, excess - best.fields.excess_k),
+        best.fields.velocity_m_s,
         temperature.std,
         pressure.std,
         velocity.std,
         temperature.informed,
         outcome=best.flow.outcome,
         solver_s=seconds,
-        notes=(*notes, *sentences(solved, share)),
+        notes=(*notes, *sentences(analysis, share)),
     )
 
 
-def sentences(solved: Solved, share: float) -> list[str]:
+def sentences(analysis: Analysis, share: float) -> list[str]:
     """Everything worth telling the operator; `share` of the images is left unexplained."""
-    parameters = solved.best.parameters
-    inflow = np.asarray(solved.layout.inflow_m3_s(parameters), float)
+    parameters = analysis.best.parameters
+    inflow = np.asarray(analysis.layout.inflow_m3_s(parameters), float)
     return [
-        *solved.layout.notes,
-        *undetermined(solved.problem),
-        *contradictions(solved.problem, solved.prior, solved.posterior),
-        *misfit(solved.data, share),
-        *balances(parameters, inflow, solved.best.seen.outflow_excess_k, solved.problem, held_k_m3_s(solved)),
+        *analysis.layout.notes,
+        *undetermined(analysis.problem),
+        *contradictions(analysis.problem, analysis.prior, analysis.posterior),
+        *misfit(analysis.data, share),
+        *balances(
+            parameters, inflow, analysis.best.fields.outflow_excess_k, analysis.problem, held_k_m3_s(analysis)
+        ),
     ]
 
 
-def held_k_m3_s(solved: Solved) -> float:
+def held_k_m3_s(analysis: Analysis) -> float:
     """What it took to hold the temperatures that measurements say, over the whole room."""
-    box = solved.problem.scene.room
-    return (solved.best.flow.held_k_s or 0.0) * float(np.prod(box.size_m))
+    box = analysis.problem.scene.room
+    return (analysis.best.flow.held_k_s or 0.0) * float(np.prod(box.size_m))
 
 
-def unexplained(data: Observations, seen: Prediction) -> float:
+def unexplained(data: Observations, fields: RoomFields) -> float:
     """Share (rms) of the measured shifts that a room does not explain."""
     values, _, group = data.values()
     shifts = group == IMAGES
     if not shifts.any():
         return _UNSEEN_SHARE
-    left = (values - data.predicted(seen))[shifts]
+    left = (values - data.predicted(fields))[shifts]
     return float(np.linalg.norm(left) / max(float(np.linalg.norm(values[shifts])), 1e-30))
 
 
@@ -134,22 +139,24 @@ def rms(field: Float[np.ndarray, "..."]) -> float:
 
 
 def _deviation(
-    solved: Solved,
+    analysis: Analysis,
     name: str,
     scale: float,
     share: float,
     extra: tuple[np.ndarray | float, np.ndarray | float] = (0.0, 0.0),
 ) -> Deviation:
-    moved = list(solved.derivatives.per_deviation(lambda run: getattr(run, name)))
-    between = [getattr(run, name) - getattr(solved.coarse, name) for run in (solved.first, solved.other)]
+    moved = list(analysis.derivatives.per_deviation(lambda run: getattr(run, name)))
+    between = [
+        getattr(run, name) - getattr(analysis.coarse, name) for run in (analysis.first, analysis.other)
+    ]
     if between[1].ndim == 3:
         # Closures pass walls' heat differently; the level that follows is measured.
         between[1] = between[1] - between[1].mean((0, 1))
-        if solved.data.planes:
+        if analysis.data.planes:
             # The profile of height is measured by the plane; only departures from it are the grid's.
             between[0] = between[0] - between[0].mean((0, 1))
     a, c, b = _SHARES[name]
-    if float(solved.prior.std.log_viscosity.max()) > 0:
+    if float(analysis.prior.std.log_viscosity.max()) > 0:
         c *= _GUESSED_VISCOSITY[name]
     represented = Represented(between[0], between[1], scale, (a, c * share, b * share))
-    return deviation(moved, solved.posterior.covariance, represented, extra)
+    return deviation(moved, analysis.posterior.covariance, represented, extra)

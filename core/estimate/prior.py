@@ -23,8 +23,8 @@ from core.estimate.balance import (
 )
 from core.problem import Problem
 from core.room.boundary_conditions import RoomLayout, RoomParameters, SuspectedHeater
-from core.room.grid import WALLS
 from core.room.openings import stated_walls
+from core.room.room_grid import WALLS
 from core.scene import Heater, Inlet
 
 # Walls' heat coefficients are right within a factor of two (one sigma 0.6 in the logarithm).
@@ -62,7 +62,7 @@ class Prior(eqx.Module):
     def active(self) -> np.ndarray:
         """Indices of the fitted parameters in the flattened vector."""
         std = self.std
-        if self.alike():
+        if self.front_and_back_tied():
             std = eqx.tree_at(lambda p: p.wall_excess_k, std, std.wall_excess_k.at[_FAR].set(0.0))
         return np.flatnonzero(np.asarray(ravel_pytree(std)[0]) > 0)
 
@@ -71,8 +71,8 @@ class Prior(eqx.Module):
         spread_k = np.asarray(self.std.wall_excess_k)
         return [name for name, std_k in zip(WALLS, spread_k, strict=True) if std_k > 0]
 
-    def alike(self) -> bool:
-        """Whether the walls before and behind the air are fitted as one: rays through both tell them not apart."""
+    def front_and_back_tied(self) -> bool:
+        """Whether the walls before and behind the air are fitted as one: rays through both report them not apart."""
         return set(FITTED_AS_ONE) <= set(self.unknown_walls())
 
     def parameters(self, vector: Float[np.ndarray, " active"]) -> RoomParameters:
@@ -83,7 +83,7 @@ class Prior(eqx.Module):
         flat = np.asarray(mean, float).copy()
         flat[chosen] += vector * std[chosen]
         found = restore(jnp.asarray(flat, mean.dtype))
-        if self.alike():
+        if self.front_and_back_tied():
             walls = found.wall_excess_k.at[_FAR].set(found.wall_excess_k[_NEAR])
             found = eqx.tree_at(lambda p: p.wall_excess_k, found, walls)
         moved = found.wall_log_heat + self._balanced(found)
@@ -113,7 +113,7 @@ class Prior(eqx.Module):
         bare = {f"heater_excess_k[{n}]" for n in np.flatnonzero(np.asarray(self.std.heater_log_heat) == 0)}
         return np.array([name in bare for name in self.names()], bool)
 
-    def firm(self) -> Bool[np.ndarray, " active"]:
+    def gaussian(self) -> Bool[np.ndarray, " active"]:
         """Which fitted parameters nobody entered, so that nobody did so wrongly: the closure, unknown walls.
 
         Where heat is suspected that nobody stated, nothing else is taken for wrong beside it.

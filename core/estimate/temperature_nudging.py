@@ -9,12 +9,12 @@ import numpy as np
 from jaxtyping import Float
 
 from core.estimate.discrepancy import Correction, temperature_correction
-from core.estimate.forward_runs import Attempt, Derivatives
-from core.estimate.observation import Observations, Prediction
+from core.estimate.forward_runs import Derivatives, ForwardRun
+from core.estimate.observation import Observations
 from core.estimate.prior import Prior
 from core.room.boundary_conditions import RoomLayout
-from core.room.grid import AXES
-from core.room.vertices import cell_matrix
+from core.room.room_grid import AXES
+from core.room.vertices import RoomFields, cell_matrix
 
 # Air of one temperature departs from nothing, yet images may say otherwise.
 _LEAST_DEPARTURE_K = 1e-3
@@ -24,18 +24,18 @@ def to_hold_k(
     data: Observations,
     prior: Prior,
     derivatives: Derivatives,
-    held: Attempt,
-    before: Attempt,
+    held: ForwardRun,
+    before: ForwardRun,
     layout: RoomLayout,
 ) -> Float[np.ndarray, " layers"]:
     """Corrected mean excess temperature of the room `before` it was held; `held` says its departures.
 
     Where walls are unknown that of every layer of cells: then the room's own profile is no better than they.
     """
-    free = free_vertices(layout, held.seen.excess_k.shape)
-    start = unheld(held.seen, before.seen, data, prior, free)
+    free = free_vertices(layout, held.fields.excess_k.shape)
+    start = unheld(held.fields, before.fields, data, prior, free)
     change = last_correction(data, prior, derivatives, start).excess_k[:, None, :] * free
-    warmer_k = layer_means(start.excess_k + change) - layer_means(held.seen.excess_k)
+    warmer_k = layer_means(start.excess_k + change) - layer_means(held.fields.excess_k)
     faces_m = layout.grid.faces_m(2)
     heights_m = np.linspace(faces_m[0], faces_m[-1], len(warmer_k))
     in_cells_k = np.interp(layout.grid.centres_m(2), heights_m, warmer_k)
@@ -44,12 +44,12 @@ def to_hold_k(
 
 
 def unheld(
-    held: Prediction,
-    before: Prediction,
+    held: RoomFields,
+    before: RoomFields,
     data: Observations,
     prior: Prior,
     free: Float[np.ndarray, "vx vy vz"],
-) -> Prediction:
+) -> RoomFields:
     """A room that was held, at the level (or profile) it had before: a correction is of what the model says."""
     shift_k = layer_means(held.excess_k) - layer_means(before.excess_k)
     if not prior.unknown_walls():
@@ -61,17 +61,17 @@ def unheld(
         height_m = ends_m.get(patch.wall, 0.5 * (patch.lower_m[1] + patch.upper_m[1]))
         heights_m = np.linspace(box.lower_m[2], box.upper_m[2], len(shift_k))
         outflow_k -= float(np.interp(height_m, heights_m, shift_k))
-    return Prediction(held.excess_k - shift_k * free, held.pressure_m2_s2, held.velocity_m_s, outflow_k)
+    return RoomFields(held.excess_k - shift_k * free, held.pressure_m2_s2, held.velocity_m_s, outflow_k)
 
 
 def last_correction(
-    data: Observations, prior: Prior, derivatives: Derivatives, seen: Prediction
+    data: Observations, prior: Prior, derivatives: Derivatives, fields: RoomFields
 ) -> Correction:
     """The correction of T by all that parameters leave unexplained."""
-    own_k = max(departure(seen.excess_k), _LEAST_DEPARTURE_K)
+    own_k = max(departure(fields.excess_k), _LEAST_DEPARTURE_K)
     level_k = max(own_k, level_std_k(derivatives))
-    residual = data.values()[0] - data.predicted(seen)
-    return temperature_correction(data, seen.excess_k, residual, own_k, level_k, prior.unknown_walls())
+    residual = data.values()[0] - data.predicted(fields)
+    return temperature_correction(data, fields.excess_k, residual, own_k, level_k, prior.unknown_walls())
 
 
 def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"]:

@@ -18,9 +18,9 @@ import equinox as eqx
 import numpy as np
 
 from core.estimate.balance import outflow_excess_k
-from core.estimate.forward_runs import Event, RoomSettings, attempt
+from core.estimate.forward_runs import Event, RoomSettings, march_under
 from core.estimate.observation import Observations
-from core.estimate.parameter_fit import Begun
+from core.estimate.parameter_fit import Background
 from core.estimate.parameter_step import misfit_ratio
 from core.estimate.prior import room_prior
 from core.problem import Problem
@@ -38,23 +38,23 @@ _WORTHWHILE = 0.8
 
 
 def with_suspected_heat(
-    begun: Begun, data: Observations, settings: RoomSettings, tell: Event
+    background: Background, data: Observations, settings: RoomSettings, report: Event
 ) -> Problem | None:
     """The problem with the strip of floor whose heat the images like best, and its neighbours; None for no strip."""
-    strips = floor_strips(begun.problem)
-    climbs = climbed_each(strips, begun, data, settings)
+    strips = floor_strips(background.problem)
+    climbs = climbed_each(strips, background, data, settings)
     if min((climb.left for climb in climbs), default=1.0) > _WORTHWHILE:
         return None
     best = min(climbs, key=lambda climb: climb.left)
     # A panel may lie half on one strip and half on the next.
-    between = floor_strips(begun.problem, between=True)
+    between = floor_strips(background.problem, between=True)
     halves = [strip for strip in between if share_area(strip.patch, best.strip.patch)]
-    best = min((best, *climbed_each(halves, begun, data, settings)), key=lambda climb: climb.left)
-    tell({"suspected_k": best.heat_k, "misfit_left": best.left})
+    best = min((best, *climbed_each(halves, background, data, settings)), key=lambda climb: climb.left)
+    report({"suspected_k": best.heat_k, "misfit_left": best.left})
     warm = replace(best.strip, temperature_k=best.strip.temperature_k + best.heat_k)
     beside = [strip for strip in (*strips, *between) if adjoin(strip, warm)]
     return with_heaters(
-        begun.problem, [replace(s, temperature_std_k=_STD_SHARE * best.heat_k) for s in (warm, *beside)]
+        background.problem, [replace(s, temperature_std_k=_STD_SHARE * best.heat_k) for s in (warm, *beside)]
     )
 
 
@@ -67,30 +67,35 @@ class Climb(NamedTuple):
 
 
 def climbed_each(
-    strips: Sequence[SuspectedHeater], begun: Begun, data: Observations, settings: RoomSettings
+    strips: Sequence[SuspectedHeater], background: Background, data: Observations, settings: RoomSettings
 ) -> list[Climb]:
     """Every strip by itself."""
-    cold = with_heaters(begun.problem, strips)
-    coarse = room(cold.scene, settings.coarse_cells, begun.coarse.closure)
+    cold = with_heaters(background.problem, strips)
+    coarse = room(cold.scene, settings.coarse_cells, background.coarse.closure)
     mean = room_prior(cold, coarse.layout).mean
     before = len(mean.heater_excess_k) - len(strips)
 
     def climb(n: int) -> Climb:
-        return Climb(*climbed(before + n, coarse, mean, begun, data, settings), strips[n])
+        return Climb(*climbed(before + n, coarse, mean, background, data, settings), strips[n])
 
     with ThreadPoolExecutor(settings.threads) as pool:
         return list(pool.map(climb, range(len(strips))))
 
 
 def climbed(
-    heater: int, coarse: Room, mean: RoomParameters, begun: Begun, data: Observations, settings: RoomSettings
+    heater: int,
+    coarse: Room,
+    mean: RoomParameters,
+    background: Background,
+    data: Observations,
+    settings: RoomSettings,
 ) -> tuple[float, float]:
     """Least misfit with this heater warm, over that of the room without, and by how many kelvin it was warm."""
-    least, best_k, flow = np.inf, 0.0, begun.base.flow.last
+    least, best_k, flow = np.inf, 0.0, background.base.flow.last
     for heat_k in _LADDER_K:
         warm = eqx.tree_at(lambda p: p.heater_excess_k, mean, mean.heater_excess_k.at[heater].add(heat_k))
-        tried = attempt(coarse, warm, flow, settings.restart_s, data.vertices, lambda _: None)
-        left = misfit_ratio(data, tried, begun.base)
+        tried = march_under(coarse, warm, flow, settings.restart_s, data.vertices, lambda _: None)
+        left = misfit_ratio(data, tried, background.base)
         if left > least:
             break
         least, best_k, flow = left, heat_k, tried.flow.last

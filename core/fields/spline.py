@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, Int
 from scipy.linalg import solve_banded
 
 from core.fields.field import AbstractField, Components
-from core.fields.grid import locate
+from core.fields.vertex_field import locate
 from core.geometry import Vector3
 
 

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from core.grid.interpolation import on_axes_together
 from core.grid.residuals import as_residuals, discrete_residuals
 from core.grid.staggered import Staggered, StaggeredGrid
-from core.losses.boussinesq import Flow, Numbers, Residuals
+from core.losses.boussinesq import FlowValues, Numbers, Residuals
 from core.losses.representation import Spans, positions
 
 
@@ -52,11 +52,11 @@ class GridFields(eqx.Module):
     state: Staggered
     grid: StaggeredGrid
 
-    def at(self, points_nd: Float[Array, "points 3"]) -> Flow:
+    def at(self, points_nd: Float[Array, "points 3"]) -> FlowValues:
         """T, p, u at scattered points, trilinear."""
         return self.grid.at(self.state, points_nd)
 
-    def on_grid(self, spans: Spans) -> Flow:
+    def on_grid(self, spans: Spans) -> FlowValues:
         """T, p, u on a tensor grid of points, trilinear."""
         x, y, z = (positions(span) for span in spans)
         return self.grid.on_grid(self.state, (x, y, z))

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from core.grid.interpolation import at_points, interpolation_matrix, on_axes, on_axes_together
-from core.losses.boussinesq import Flow
+from core.losses.boussinesq import FlowValues
 
 Corner = tuple[float, float, float]
 Shape = tuple[int, int, int]
@@ -74,20 +74,20 @@ class StaggeredGrid(eqx.Module):
             for knots, target in zip(self.axes, targets, strict=True)
         )
 
-    def on_grid(self, state: Staggered, axes: Axes) -> Flow:
+    def on_grid(self, state: Staggered, axes: Axes) -> FlowValues:
         """T, p, u on a tensor grid of points, nondimensional."""
         values = on_axes_together(state.components, self.matrices([axes] * 5))
-        return Flow(values[0], values[1], jnp.stack(values[2:], axis=-1))
+        return FlowValues(values[0], values[1], jnp.stack(values[2:], axis=-1))
 
-    def at(self, state: Staggered, points: Float[Array, "points 3"]) -> Flow:
+    def at(self, state: Staggered, points: Float[Array, "points 3"]) -> FlowValues:
         """T, p, u at scattered points, nondimensional."""
         values = [
             at_points(component, knots, points)
             for component, knots in zip(state.components, self.axes, strict=True)
         ]
-        return Flow(values[0], values[1], jnp.stack(values[2:], axis=-1))
+        return FlowValues(values[0], values[1], jnp.stack(values[2:], axis=-1))
 
-    def of_fields(self, axes: Axes, flow: Flow) -> Staggered:
+    def of_fields(self, axes: Axes, flow: FlowValues) -> Staggered:
         """Sample fields that are given on a tensor grid at this grid's unknowns (linear)."""
         given = (flow.temperature, flow.pressure, *(flow.velocity[..., c] for c in range(3)))
         sampled = []

@@ -22,7 +22,7 @@ EXCESS_FLOOR_K = 0.1
 VELOCITY_FLOOR_M_S = 0.01
 
 
-class Flow(eqx.Module):
+class FlowValues(eqx.Module):
     """T, p, u at points, or one of their derivatives: the derivative's axes come last."""
 
     temperature: Float[Array, "..."]
@@ -64,7 +64,7 @@ class Numbers:
         )
 
 
-def residuals(value: Flow, grad: Flow, laplacian: Flow, numbers: Numbers) -> Residuals:
+def residuals(value: FlowValues, grad: FlowValues, laplacian: FlowValues, numbers: Numbers) -> Residuals:
     """The residuals at one point; `grad.velocity[i, j]` is the derivative of component i along axis j."""
     u, temperature = value.velocity, value.temperature
     gravity = jnp.array([0.0, 0.0, -1.0], u.dtype)
@@ -107,16 +107,16 @@ class Scales:
         temperature_k: Float[Array, "*points"],
         pressure_m2_s2: Float[Array, "*points"],
         velocity_m_s: Float[Array, "*points 3"],
-    ) -> Flow:
+    ) -> FlowValues:
         """Dimensionless fields."""
-        return Flow(
+        return FlowValues(
             (temperature_k - self.reference_k) / self.excess_k,
             pressure_m2_s2 / self.pressure_m2_s2,
             velocity_m_s / self.velocity_m_s,
         )
 
     def to_si(
-        self, flow: Flow
+        self, flow: FlowValues
     ) -> tuple[Float[Array, "*points"], Float[Array, "*points"], Float[Array, "*points 3"]]:
         """T [K], p [m2/s2], u [m/s]."""
         return (

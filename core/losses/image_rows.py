@@ -18,8 +18,8 @@ from core.displacement import derivative_filter
 from core.losses.shifts import ShiftRows, similarity_basis
 from core.problem import ImagePair
 from core.rays.operator import build
-from core.render.geometry import PixelGeometry, pixel_geometry
 from core.render.light import pattern_image, sample_pattern
+from core.render.pixel_geometry import PixelGeometry, pixel_geometry
 from core.scene import Scene
 from core.setting import SettingError
 

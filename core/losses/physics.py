@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
-from core.losses.boussinesq import Flow, Numbers
+from core.losses.boussinesq import FlowValues, Numbers
 from core.losses.representation import Fields, Spans, Unknowns, points_of
 
 Rows = tuple[Float[Array, "..."], ...]
@@ -67,22 +67,22 @@ class PhysicsLoss(eqx.Module):
         return dataclasses.replace(self, points=points)
 
 
-class Patch(eqx.Module):
+class KnownValues(eqx.Module):
     """Known values on a tensor grid of points; with `minus`, known differences to a second one.
 
     `weight` is zero where a field is not known.
     """
 
     spans: Spans = eqx.field(static=True)
-    target: Flow
-    weight: Flow
+    target: FlowValues
+    weight: FlowValues
     minus: Spans | None = eqx.field(static=True, default=None)
 
 
 class BoundaryLoss(eqx.Module):
     """λ2 times the mean over the boundary points of the squared, weighted error of T, p, u."""
 
-    patches: tuple[Patch, ...]
+    patches: tuple[KnownValues, ...]
     weight: float = eqx.field(static=True, default=1.0)
     points: int = eqx.field(static=True, default=4096)
     name: str = eqx.field(static=True, default="boundary")
@@ -115,7 +115,7 @@ class BoundaryLoss(eqx.Module):
         """The same on mini-batches of `points`."""
         return dataclasses.replace(self, points=points)
 
-    def _flattened(self) -> tuple[Float[Array, "points 3"], Flow, Flow]:
+    def _flattened(self) -> tuple[Float[Array, "points 3"], FlowValues, FlowValues]:
         points = jnp.concatenate([jnp.asarray(points_of(p.spans), jnp.float32) for p in self.patches])
         target = _join([p.target for p in self.patches])
         return points, target, _join([p.weight for p in self.patches])
@@ -134,8 +134,8 @@ class PointLoss(eqx.Module):
     """Known values at scattered points, each over its standard deviation: sensors, the gauge of p."""
 
     points_nd: Float[Array, "points 3"]
-    target: Flow
-    weight: Flow
+    target: FlowValues
+    weight: FlowValues
     name: str = eqx.field(static=True, default="sensors")
 
     def rows(self, fields: Fields, unknowns: Unknowns, key: PRNGKeyArray | None) -> Rows:
@@ -218,19 +218,19 @@ def total(
     return jnp.stack(list(parts.values())).sum(), parts
 
 
-def _patch_values(fields: Fields, patch: Patch) -> Flow:
+def _patch_values(fields: Fields, patch: KnownValues) -> FlowValues:
     found = fields.on_grid(patch.spans)
     if patch.minus is None:
         return found
     return jax.tree.map(jnp.subtract, found, fields.on_grid(patch.minus))
 
 
-def _errors(found: Flow, target: Flow, weight: Flow) -> Rows:
+def _errors(found: FlowValues, target: FlowValues, weight: FlowValues) -> Rows:
     return tuple(jax.tree.leaves(jax.tree.map(lambda f, t, w: w * (f - t), found, target, weight)))
 
 
-def _join(flows: Sequence[Flow]) -> Flow:
-    return Flow(
+def _join(flows: Sequence[FlowValues]) -> FlowValues:
+    return FlowValues(
         jnp.concatenate([f.temperature.reshape(-1) for f in flows]),
         jnp.concatenate([f.pressure.reshape(-1) for f in flows]),
         jnp.concatenate([f.velocity.reshape(-1, 3) for f in flows]),

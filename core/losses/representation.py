@@ -9,7 +9,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
-from core.losses.boussinesq import Flow, Numbers, Residuals
+from core.losses.boussinesq import FlowValues, Numbers, Residuals
 
 Span = tuple[float, float, int]
 Spans = tuple[Span, Span, Span]
@@ -19,11 +19,11 @@ Spans = tuple[Span, Span, Span]
 class Fields(Protocol):
     """T, p, u in nondimensional coordinates, evaluated."""
 
-    def at(self, points_nd: Float[Array, "points 3"]) -> Flow:
+    def at(self, points_nd: Float[Array, "points 3"]) -> FlowValues:
         """Values at scattered points."""
         ...
 
-    def on_grid(self, spans: Spans) -> Flow:
+    def on_grid(self, spans: Spans) -> FlowValues:
         """Values on a tensor grid of points: first, last and number along x, y, z."""
         ...
 

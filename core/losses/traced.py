@@ -22,8 +22,8 @@ from core.losses.physics import Rows
 from core.losses.representation import Fields, Unknowns
 from core.problem import ImagePair, ShiftMeasurement
 from core.rays import QuasiLinearTracer
-from core.render.geometry import PixelGeometry, pixel_geometry
 from core.render.light import pattern_image, sample_pattern
+from core.render.pixel_geometry import PixelGeometry, pixel_geometry
 from core.render.shift import pattern_offset_px, wall_offset_m
 from core.scene import Scene
 from core.setting import SettingError

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax.typing import DTypeLike
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from core.losses.boussinesq import Flow, Numbers, Residuals, residuals
+from core.losses.boussinesq import FlowValues, Numbers, Residuals, residuals
 from core.losses.representation import Spans, points_of
 from core.mlp.propagation import Activation, activate, propagate_activation, propagate_linear
 from core.setting import SettingError, setting
@@ -49,7 +49,7 @@ class Mlp(eqx.Module):
     upper: Corner = eqx.field(static=True)
     activation: Activation = eqx.field(static=True)
 
-    def at(self, points_nd: Float[Array, "points 3"]) -> Flow:
+    def at(self, points_nd: Float[Array, "points 3"]) -> FlowValues:
         """Values."""
         hidden = self._normalised(points_nd)
         if self.frequencies is not None:
@@ -59,7 +59,9 @@ class Mlp(eqx.Module):
             hidden = activate(self.activation, hidden @ weight + bias[None, :])
         return _split(hidden @ self.weights[-1] + self.biases[-1][None, :])
 
-    def with_derivatives(self, points_nd: Float[Array, "points 3"]) -> tuple[Flow, Flow, Flow]:
+    def with_derivatives(
+        self, points_nd: Float[Array, "points 3"]
+    ) -> tuple[FlowValues, FlowValues, FlowValues]:
         """Values, gradients (last axis x, y, z) and Laplacians, in nondimensional coordinates."""
         stack = self._input_stack(points_nd)
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
@@ -68,7 +70,7 @@ class Mlp(eqx.Module):
         gradient = jnp.moveaxis(stack[1:4], 0, -1)
         return (
             _split(stack[0]),
-            Flow(gradient[:, 0], gradient[:, 1], gradient[:, 2:]),
+            FlowValues(gradient[:, 0], gradient[:, 1], gradient[:, 2:]),
             _split(stack[4]),
         )
 
@@ -76,7 +78,7 @@ class Mlp(eqx.Module):
         """Itself: there is nothing to share between losses."""
         return self
 
-    def on_grid(self, spans: Spans) -> Flow:
+    def on_grid(self, spans: Spans) -> FlowValues:
         """T, p, u on a tensor grid of points."""
         shape = tuple(span[2] for span in spans)
         found = self.at(jnp.asarray(points_of(spans), self.biases[0].dtype))
@@ -134,5 +136,5 @@ def initial_mlp(
     return Mlp(tuple(weights), biases, frequencies, lower, upper, settings.activation)
 
 
-def _split(outputs: Float[Array, "points 5"]) -> Flow:
-    return Flow(outputs[:, 0], outputs[:, 1], outputs[:, 2:])
+def _split(outputs: Float[Array, "points 5"]) -> FlowValues:
+    return FlowValues(outputs[:, 0], outputs[:, 1], outputs[:, 2:])

@@ -18,7 +18,7 @@ from core.estimate.prior import room_prior
 from core.plan.expected import ExpectedFlow
 from core.problem import Problem
 from core.room.forward import closure_name, room
-from core.room.grid import WALLS
+from core.room.room_grid import WALLS
 from core.scene import Heater, Inlet, Wall
 from core.setting import setting
 from core.solve.draft.draft import draft_grid
@@ -79,10 +79,10 @@ def room_work(problem: Problem, flow: ExpectedFlow, settings: RoomSettings) -> W
     far = bool(prior.unknown_walls())
     rounds = min(settings.rounds, _UNKNOWN_ROUNDS if far else _STATED_ROUNDS)
     # One coarse correction that is tried, and the second closure's run, beside the Jacobian's.
-    coarse_s = settings.settle_s + (1 + settings.again * far) * restarts + 2 * settings.restart_s
+    coarse_s = settings.settle_s + (1 + settings.renewals * far) * restarts + 2 * settings.restart_s
     # The room as stated, each round, and two marches that are held.
     fine_s = (2 + rounds) * settings.refine_s + settings.final_s
-    steps = flow.pace / flow.step_s * flow.cell_m
+    steps = flow.turnover_ratio / flow.step_s * flow.cell_m
     loops = 0.0
     for place, seconds in ((coarse, coarse_s), (fine, fine_s)):
         cells = float(np.prod(place.grid.cells))

@@ -11,14 +11,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from core.air import Air
-from core.estimate.forward_runs import RoomSettings, settled
+from core.estimate.forward_runs import RoomSettings, run_as_stated
 from core.estimate.plane_openings import with_plane_openings
 from core.estimate.prior import room_prior
 from core.fields import SplineField, plume, through_vertices
 from core.known import VertexGrid
 from core.problem import Problem
 from core.room.forward import closure_name, room
-from core.room.model import longest_step_s
+from core.room.step import longest_step_s
 from core.scene import Heater, Inlet, Scene, Wall
 from core.setting import SettingError
 
@@ -33,7 +33,7 @@ COURANT = 0.45
 
 @dataclass(frozen=True)
 class ExpectedFlow:
-    """Excess temperature on a vertex grid, in words where it comes from, and its pace where it was marched.
+    """Excess temperature on a vertex grid, in words where it comes from, and its turnover_ratio where it was marched.
 
     `step_s` is the longest stable time step on cells of `cell_m`, for the cost of finer marches.
     """
@@ -45,7 +45,7 @@ class ExpectedFlow:
     pressure_rms_m2_s2: float | None = None
     step_s: float | None = None
     cell_m: float | None = None
-    pace: float = 1.0
+    turnover_ratio: float = 1.0
 
     def excess_refractivity(self, air: Air) -> Float[Array, "nx ny nz"]:
         """N - N0 on the vertices."""
@@ -104,14 +104,14 @@ def _marched(problem: Problem) -> ExpectedFlow:
     coarse = room(scene, _COARSE.coarse_cells, closure_name(scene))
     shape = (_VERTICES, _VERTICES, _VERTICES)
     prior = room_prior(problem, coarse.layout)
-    done = settled(coarse, prior, problem, _COARSE, shape, lambda _: None)
-    excess = _without_layers(np.asarray(done.seen.excess_k, np.float64))
+    done = run_as_stated(coarse, prior, problem, _COARSE, shape, lambda _: None)
+    excess = _without_layers(np.asarray(done.fields.excess_k, np.float64))
     # A coarse march that has not settled may overshoot; air is between what drives it.
     stated = [0.0, *_stated_excesses_k(problem)]
     excess = np.clip(excess, min(stated), max(stated))
     step_s = float(longest_step_s(done.flow.last, coarse.model(prior.mean), COURANT))
-    speed = float(np.sqrt(np.mean(np.sum(np.square(done.seen.velocity_m_s), -1))))
-    pressure = done.seen.pressure_m2_s2
+    speed = float(np.sqrt(np.mean(np.sum(np.square(done.fields.velocity_m_s), -1))))
+    pressure = done.fields.pressure_m2_s2
     return ExpectedFlow(
         VertexGrid(scene.room, shape),
         excess,
@@ -120,7 +120,7 @@ def _marched(problem: Problem) -> ExpectedFlow:
         float(np.std(pressure)),
         step_s,
         min(coarse.grid.spacing_m),
-        coarse.pace,
+        coarse.turnover_ratio,
     )
 
 
@@ -138,7 +138,7 @@ def _rescaled(flow: ExpectedFlow, excess_k: float, known_k: float) -> ExpectedFl
         flow.pressure_rms_m2_s2,
         flow.step_s,
         flow.cell_m,
-        flow.pace,
+        flow.turnover_ratio,
     )
 
 

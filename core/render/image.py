@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Array, Float, Float32
 
 from core.fields import AbstractField
-from core.render.choice import RenderChoice, choose
-from core.render.geometry import pixel_geometry
 from core.render.light import pattern_image
 from core.render.pixel_filter import quadrature
+from core.render.pixel_geometry import pixel_geometry
 from core.render.pixels import Exposure, lens_points, pattern_motion
+from core.render.render_choice import RenderChoice, choose
 from core.scene import Scene
 
 _PIXELS_A_BLOCK = 2**18

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 from core.fields import AbstractField
 from core.rays.bundle import Rays
 from core.rays.tracer import AbstractRayTracer
-from core.render.geometry import PixelGeometry
+from core.render.pixel_geometry import PixelGeometry
 from core.render.shift import aim
 
 _PROBE_M = 2e-3

@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from core.fields import AbstractField
-from core.render.choice import RenderChoice, choose
-from core.render.geometry import PixelGeometry, pixel_geometry
 from core.render.irradiance import irradiance_factor
 from core.render.light import pattern_image, sample_pattern
 from core.render.pixel_filter import lens_disc, monte_carlo, quadrature
+from core.render.pixel_geometry import PixelGeometry, pixel_geometry
+from core.render.render_choice import RenderChoice, choose
 from core.render.shift import pattern_offset_px, wall_offset_m
 from core.scene import Scene
 

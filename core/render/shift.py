@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 from core.fields import AbstractField
 from core.rays.bundle import Rays
 from core.rays.tracer import AbstractRayTracer
-from core.render.geometry import PixelGeometry
+from core.render.pixel_geometry import PixelGeometry
 
 
 def wall_offset_m(

@@ -11,8 +11,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from core.room.boundary import Boundary, WallPlane, closed_wall
-from core.room.grid import AXES, WALLS, RoomGrid
 from core.room.openings import (
     Opening,
     lay_patch,
@@ -21,6 +19,8 @@ from core.room.openings import (
     stated_walls,
     supply_turbulence,
 )
+from core.room.room_grid import AXES, WALLS, RoomGrid
+from core.room.wall_planes import Boundary, WallPlane, closed_wall
 from core.scene import Heater, Inlet, Outlet, Scene
 from core.setting import SettingError
 
@@ -62,7 +62,7 @@ class RoomLayout(eqx.Module):
     heaters: tuple[Opening, ...]
     shown: tuple[bool, ...] = eqx.field(static=True)
     heated: Float[np.ndarray, "6"]
-    grip: Float[np.ndarray, "6"]
+    no_slip: Float[np.ndarray, "6"]
     held: Float[np.ndarray, "6"]
     notes: tuple[str, ...] = eqx.field(static=True)
 
@@ -100,7 +100,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
         refuse_outward(inlet, opening)
     stated = [walls[name] for name in WALLS]
     heated = np.array([float(wall is None or wall.thermal != "adiabatic") for wall in stated])
-    grip = np.array([float(wall is None or wall.no_slip) for wall in stated])
+    no_slip = np.array([float(wall is None or wall.no_slip) for wall in stated])
     held = np.array([float(wall is not None and wall.thermal == "temperature") for wall in stated])
     return RoomLayout(
         grid,
@@ -111,7 +111,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
         tuple(place[2]),
         tuple(not isinstance(heater, SuspectedHeater) for heater in heaters),
         heated,
-        grip,
+        no_slip,
         held,
         tuple(notes),
     )
@@ -138,7 +138,7 @@ def boundary(layout: RoomLayout, parameters: RoomParameters) -> Boundary:
 def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlane:
     """The wall with its heaters, without openings' flow: conductances add, weighted by area."""
     grid = layout.grid
-    plane = closed_wall(grid, wall // 2, float(layout.grip[wall]))
+    plane = closed_wall(grid, wall // 2, float(layout.no_slip[wall]))
     closed = jnp.ones_like(plane.normal_m_s)
     for opening in (*layout.inlets, *layout.outlets, *layout.heaters):
         if opening.wall == wall:
@@ -186,6 +186,6 @@ def _with_inlet(plane: WallPlane, layout: RoomLayout, n: int, parameters: RoomPa
         plane.wall_excess_k,
         put(plane.turbulent_energy_m2_s2, k * gain**2),
         put(plane.dissipation_m2_s3, epsilon * gain**3),
-        plane.grip,
+        plane.no_slip,
         plane.held,
     )

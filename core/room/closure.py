@@ -14,10 +14,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.room.boundary import Boundary, Plane
-from core.room.grid import AXES, Cells, RoomGrid, Velocity, face_mean, first_plane, last_plane
 from core.room.k_epsilon import KEpsilonState, advance, energy_walls, heat_walls
 from core.room.momentum import Viscosity
+from core.room.room_grid import AXES, Cells, RoomGrid, Velocity, face_mean, first_plane, last_plane
+from core.room.wall_planes import Boundary, Plane
 
 
 class AbstractClosure(eqx.Module):

@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from core.air import GRAVITY_M_S2
-from core.estimate.observation import Prediction
 from core.room.boundary_conditions import RoomLayout, RoomParameters, boundary, room_layout
 from core.room.closure import (
     AbstractClosure,
@@ -15,10 +14,11 @@ from core.room.closure import (
     ZeroEquationClosure,
     wall_distance_m,
 )
-from core.room.grid import AXES, RoomGrid, Velocity, room_grid
-from core.room.model import Flow, RoomModel, air_at_rest, room_model
 from core.room.openings import opening_edges_m
+from core.room.room_grid import AXES, RoomGrid, Velocity, room_grid
+from core.room.step import Flow, RoomModel, air_at_rest, room_model
 from core.room.vertices import (
+    RoomFields,
     linear_matrix,
     vertex_excess_k,
     vertex_pressure_m2_s2,
@@ -45,7 +45,7 @@ class Room(eqx.Module):
         return self.layout.grid
 
     @property
-    def pace(self) -> float:
+    def turnover_ratio(self) -> float:
         """How much slower than the reference room (3.3 m at 0.5 m/s) this one turns over, at least 1."""
         edge_m = float(np.prod(self.scene.room.size_m)) ** (1 / 3)
         return float(np.clip(edge_m / self.speed_m_s / 6.6, 1.0, 4.0))
@@ -137,10 +137,10 @@ def carried_over(flow: Flow, source: RoomGrid, target: RoomGrid) -> Flow:
     return Flow(velocity, cells(flow.excess_k), cells(flow.pressure_m2_s2), turbulence)
 
 
-def seen(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> Prediction:
+def room_fields(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> RoomFields:
     """The flow on the room's vertices."""
     excess, pressure, velocity, outflow = _vertices(flow, model, vertices)
-    return Prediction(np.asarray(excess), np.asarray(pressure), np.asarray(velocity), float(outflow))
+    return RoomFields(np.asarray(excess), np.asarray(pressure), np.asarray(velocity), float(outflow))
 
 
 @eqx.filter_jit

@@ -14,8 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from core.room.boundary import Boundary
-from core.room.grid import (
+from core.room.room_grid import (
     AXES,
     Cells,
     RoomGrid,
@@ -27,6 +26,7 @@ from core.room.grid import (
     last_plane,
 )
 from core.room.transport import add_to_walls, scalar_rate
+from core.room.wall_planes import Boundary
 
 C_MU, C_1, C_2, SIGMA_EPSILON = 0.09, 1.44, 1.92, 1.3
 KAPPA, WALL_E, LAMINAR_Y_PLUS = 0.41, 9.8, 11.53
@@ -99,15 +99,15 @@ def wall_sources(
     walls = energy_walls(k, grid, molecular_m2_s)
     for a in AXES:
         y = 0.5 * grid.spacing_m[a]
-        parts, grips = [], [jnp.full(grid.plane(a), wall.grip) for wall in boundary.walls[a]]
+        parts, grips = [], [jnp.full(grid.plane(a), wall.no_slip) for wall in boundary.walls[a]]
         for side, nearest in enumerate((first_plane, last_plane)):
             b, c = (other for other in AXES if other != a)
             speed = jnp.sqrt(nearest(cells[b], a) ** 2 + nearest(cells[c], a) ** 2 + 1e-12)
             root = jnp.sqrt(nearest(k, a))
             rate = C_MU**0.25 * root / (KAPPA * y)
-            grip = grips[side]
+            no_slip = grips[side]
             parts.append(
-                (grip * walls[a][side] * speed / y * rate, grip * C_MU**0.75 * root**3 / (KAPPA * y))
+                (no_slip * walls[a][side] * speed / y * rate, no_slip * C_MU**0.75 * root**3 / (KAPPA * y))
             )
         production = add_to_walls(production, parts[0][0], parts[1][0], a)
         epsilon = add_to_walls(epsilon, parts[0][1], parts[1][1], a)

@@ -10,8 +10,8 @@ algebraic multigrid; its fixed point is the steady state, for which r = 0.
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.room.grid import AXES, Cells, cut, face_mean
-from core.room.model import Flow, RoomModel
+from core.room.room_grid import AXES, Cells, cut, face_mean
+from core.room.step import Flow, RoomModel
 
 
 def level_correction(flow: Flow, warming_k_s: Cells, model: RoomModel, ahead_s: float) -> Float[Array, " nz"]:

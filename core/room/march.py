@@ -18,9 +18,9 @@ from jax import lax
 from jaxtyping import Array, Bool, Float
 
 from core.result import Outcome
-from core.room.grid import Cells
 from core.room.level import level_correction
-from core.room.model import Flow, RoomModel, longest_step_s, two_steps
+from core.room.room_grid import Cells
+from core.room.step import Flow, RoomModel, longest_step_s, two_steps
 from core.setting import SettingError, setting
 
 

@@ -4,8 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.room.boundary import Boundary, WallPlane
-from core.room.grid import (
+from core.room.room_grid import (
     AXES,
     Cells,
     RoomGrid,
@@ -20,6 +19,7 @@ from core.room.grid import (
     within,
 )
 from core.room.transport import add_to_walls, limited_flux
+from core.room.wall_planes import Boundary, WallPlane
 
 Field = Float[Array, "..."]
 
@@ -95,7 +95,7 @@ def _ghost(wall: WallPlane, cell: Field, a: int, b: int, *, inward: float) -> Fi
     """Tangential velocity beyond wall b: the inflow's own; mirrored at a wall; continued at a free one."""
     tangent = _on_faces(_tangent(wall, a, b), a, b)
     inflow = _on_faces(wall.normal_m_s, a, b) * inward > 0
-    mirrored = wall.grip * (2.0 * tangent - cell) + (1.0 - wall.grip) * cell
+    mirrored = wall.no_slip * (2.0 * tangent - cell) + (1.0 - wall.no_slip) * cell
     return jnp.where(inflow, tangent, mirrored)
 
 
@@ -109,7 +109,7 @@ def _friction(
     for side, (wall, nearest) in enumerate(zip(boundary.walls[b], (first_plane, last_plane), strict=True)):
         slip = nearest(inner, b) - _on_faces(_tangent(wall, a, b), a, b)
         nu = _on_faces(viscosity.walls_m2_s[b][side], a, b)
-        beside.append(-wall.grip * nu * slip / (0.5 * grid.spacing_m[b] ** 2))
+        beside.append(-wall.no_slip * nu * slip / (0.5 * grid.spacing_m[b] ** 2))
     return beside[0], beside[1]
 
 

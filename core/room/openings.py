@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from core.geometry import Box
-from core.room.grid import AXES, WALLS, RoomGrid
+from core.room.room_grid import AXES, WALLS, RoomGrid
 from core.scene import Inlet, Outlet, Patch, Scene, Wall
 from core.setting import SettingError
 

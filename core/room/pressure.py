@@ -13,7 +13,7 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Float
 
-from core.room.grid import (
+from core.room.room_grid import (
     AXES,
     Cells,
     RoomGrid,

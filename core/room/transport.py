@@ -8,8 +8,7 @@ Euler in time it is stable below a Courant number of one half, summed over the a
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.room.boundary import Boundary, inflow_ghosts
-from core.room.grid import (
+from core.room.room_grid import (
     AXES,
     Cells,
     RoomGrid,
@@ -22,6 +21,7 @@ from core.room.grid import (
     last_plane,
     within,
 )
+from core.room.wall_planes import Boundary, inflow_ghosts
 
 Field = Float[Array, "..."]
 

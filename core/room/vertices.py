@@ -2,16 +2,26 @@
 
 from collections.abc import Callable
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from core.room.boundary import Boundary, WallPlane
-from core.room.grid import AXES, Cells, RoomGrid, Velocity, cut, first_plane, last_plane
-from core.room.model import Flow, RoomModel
+from core.room.room_grid import AXES, Cells, RoomGrid, Velocity, cut, first_plane, last_plane
+from core.room.step import Flow, RoomModel
+from core.room.wall_planes import Boundary, WallPlane
 
 Vertices = Float[Array, "vx vy vz"]
 Field = Float[Array, "..."]
+
+
+class RoomFields(eqx.Module):
+    """A room on its vertices, as measurements see it; `outflow_excess_k` is the mean over the outlets."""
+
+    excess_k: Float[np.ndarray, "vx vy vz"]
+    pressure_m2_s2: Float[np.ndarray, "vx vy vz"]
+    velocity_m_s: Float[np.ndarray, "vx vy vz 3"]
+    outflow_excess_k: float
 
 
 def vertex_axes_m(grid: RoomGrid, vertices: tuple[int, int, int]) -> tuple[Float[np.ndarray, " n"], ...]:
@@ -133,7 +143,7 @@ def _close(component: Field, walls: tuple[WallPlane, WallPlane], a: int, b: int)
         cell = nearest(component, b)
         # An axis closed before is longer by its two walls.
         grown = [((n - m) // 2,) * 2 for n, m in zip(cell.shape, on_faces.shape, strict=True)]
-        planes.append(wall.grip * jnp.pad(on_faces, grown, mode="edge") + (1.0 - wall.grip) * cell)
+        planes.append(wall.no_slip * jnp.pad(on_faces, grown, mode="edge") + (1.0 - wall.no_slip) * cell)
     return jnp.concatenate([jnp.expand_dims(planes[0], b), component, jnp.expand_dims(planes[1], b)], b)
 
 

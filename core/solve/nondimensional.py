@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from core.geometry import Box
-from core.losses.boussinesq import Flow, Numbers, Scales, scales
+from core.losses.boussinesq import FlowValues, Numbers, Scales, scales
 from core.losses.representation import Spans, positions
 from core.problem import Problem
 from core.scene import FlowModel, Heater, Inlet, Outlet, Wall
@@ -61,7 +61,7 @@ def frame_of(problem: Problem) -> Frame:
     return Frame(room, found, _numbers(scene.flow, problem, found), (x, y, z))
 
 
-def height_profile(problem: Problem, frame: Frame, spans: Spans) -> Flow:
+def height_profile(problem: Problem, frame: Frame, spans: Spans) -> FlowValues:
     """Median over y of T and p on a known plane across x or y, carried through the room.
 
     Without a plane the temperature of the air that leaves, where an outlet knows it, with the pressure of
@@ -85,7 +85,7 @@ def height_profile(problem: Problem, frame: Frame, spans: Spans) -> Flow:
         pressure += (
             np.interp(z_m, plane.second_m, np.median(plane.pressure_m2_s2, axis=0)) / scales.pressure_m2_s2
         )
-    return Flow(jnp.asarray(temperature), jnp.asarray(pressure), jnp.zeros((*shape, 3)))
+    return FlowValues(jnp.asarray(temperature), jnp.asarray(pressure), jnp.zeros((*shape, 3)))
 
 
 def measured_outlets(problem: Problem) -> list[tuple[Outlet, float]]:
@@ -121,7 +121,7 @@ def _numbers(flow: FlowModel, problem: Problem, found: Scales) -> Numbers:
         case "given":
             if flow.viscosity_m2_s is None or flow.diffusivity_m2_s is None:
                 raise SettingError(
-                    f"Flow transport is 'given', with viscosity_m2_s {flow.viscosity_m2_s} and "
+                    f"FlowValues transport is 'given', with viscosity_m2_s {flow.viscosity_m2_s} and "
                     f"diffusivity_m2_s {flow.diffusivity_m2_s}; give both, or take transport = 'auto'."
                 )
             viscosity, diffusivity = flow.viscosity_m2_s, flow.diffusivity_m2_s

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from core.losses.boundary import boundary_loss, level_loss, point_losses
+from core.losses.boundary_loss import boundary_loss, level_loss, point_losses
 from core.losses.image_rows import pixel_centres, rendered_rows, warped_rows
 from core.losses.physics import Loss, PhysicsLoss, PriorLoss, SmoothnessLoss
 from core.losses.shifts import ShiftLoss, ShiftRows, displacement_rows, similarity_basis

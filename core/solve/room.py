@@ -12,21 +12,21 @@ import numpy as np
 from core.estimate.alternatives import HEAT_WORTHWHILE, left_over, promising_closure, suspected_heat
 from core.estimate.diagnostics import another_closure
 from core.estimate.forward_runs import (
-    Attempt,
     Derivatives,
     Event,
+    ForwardRun,
     RoomSettings,
-    attempt,
-    otherwise_closed,
+    march_under,
     perturbed,
-    settled,
+    run_as_stated,
+    run_under_other_closure,
 )
 from core.estimate.levenberg_marquardt import fine_search
 from core.estimate.observation import Observations, observations
-from core.estimate.parameter_fit import Begun, coarse_fit, fine_fit, held_fit
+from core.estimate.parameter_fit import Background, coarse_fit, fine_fit, held_fit
 from core.estimate.parameter_step import Vector
 from core.estimate.plane_openings import with_plane_openings
-from core.estimate.posterior import Solved, solution
+from core.estimate.posterior import Analysis, solution
 from core.estimate.prior import room_prior
 from core.problem import Problem
 from core.result import Solution
@@ -43,11 +43,13 @@ def solve_room(
         SettingError: a boundary that cannot be (see `core.room.boundary_conditions`).
     """
     start_s = time.perf_counter()
-    tell: Event = on_event or (lambda _: None)
-    return finish(begin(problem, settings, tell), problem, settings, tell, start_s=start_s)
+    report: Event = on_event or (lambda _: None)
+    return analyse(background_of(problem, settings, report), problem, settings, report, start_s=start_s)
 
 
-def begin(problem: Problem, settings: RoomSettings, tell: Event, closure: str | None = None) -> Begun:
+def background_of(
+    problem: Problem, settings: RoomSettings, report: Event, closure: str | None = None
+) -> Background:
     """What is the same for all images of a room: both grids as stated, and the coarse one's derivatives.
 
     `closure` is another than the scene's.
@@ -59,78 +61,82 @@ def begin(problem: Problem, settings: RoomSettings, tell: Event, closure: str | 
     prior = room_prior(
         problem, coarse.layout, log_viscosity_std=settings.log_viscosity_std, wall_heat=settings.wall_heat
     )
-    base = settled(coarse, prior, problem, settings, vertices, tell)
+    base = run_as_stated(coarse, prior, problem, settings, vertices, report)
     flow = carried_over(base.flow.last, coarse.grid, fine.grid)
-    first = attempt(fine, prior.mean, flow, settings.refine_s, vertices, tell)
+    first = march_under(fine, prior.mean, flow, settings.refine_s, vertices, report)
     derivatives = perturbed(coarse, prior, np.zeros(len(prior.active())), base, settings, vertices)
     # As it looks after having settled for as long again.
-    base = Attempt(base.parameters, base.flow, derivatives.start)
-    return Begun(problem, coarse, fine, prior, base, first, derivatives)
+    base = ForwardRun(base.parameters, base.flow, derivatives.start)
+    return Background(problem, coarse, fine, prior, base, first, derivatives)
 
 
-def finish(
-    begun: Begun, problem: Problem, settings: RoomSettings, tell: Event, *, start_s: float
+def analyse(
+    background: Background, problem: Problem, settings: RoomSettings, report: Event, *, start_s: float
 ) -> Solution:
-    """The solution for the shifts of `problem`, another measurement of the room that was begun.
+    """The solution for the shifts of `problem`, another measurement of the room that was background.
 
     Where heat that nobody stated, or another closure, may explain the images better, a room with it is fitted as well
     and the better of the two is taken.
     """
-    solved = fitted_room(begun, problem, settings, tell)
+    analysis = fitted_room(background, problem, settings, report)
     notes: tuple[str, ...] = ()
-    name = promising_closure(solved, begun.coarse) if settings.use_images else None
+    name = promising_closure(analysis, background.coarse) if settings.use_images else None
     if name is not None:
-        again = fitted_room(begin(begun.problem, settings, tell, name), problem, settings, tell)
-        if left_over(again) < left_over(solved):
-            notes = (another_closure(name, left_over(again), begun.coarse.closure, left_over(solved)),)
-            solved = again
-    warm = suspected_heat(solved, begun, settings, tell)
+        again = fitted_room(
+            background_of(background.problem, settings, report, name), problem, settings, report
+        )
+        if left_over(again) < left_over(analysis):
+            notes = (another_closure(name, left_over(again), background.coarse.closure, left_over(analysis)),)
+            analysis = again
+    warm = suspected_heat(analysis, background, settings, report)
     if warm is not None:
-        again = fitted_room(begin(warm, settings, tell, begun.coarse.closure), problem, settings, tell)
-        if left_over(again) < HEAT_WORTHWHILE * left_over(solved):
-            notes, solved = (), again
-    tell(supplied(solved.layout, solved.best))
-    return solution(solved, time.perf_counter() - start_s, use_images=settings.use_images, notes=notes)
+        again = fitted_room(
+            background_of(warm, settings, report, background.coarse.closure), problem, settings, report
+        )
+        if left_over(again) < HEAT_WORTHWHILE * left_over(analysis):
+            notes, analysis = (), again
+    report(supplied(analysis.layout, analysis.best))
+    return solution(analysis, time.perf_counter() - start_s, use_images=settings.use_images, notes=notes)
 
 
-def data_of(begun: Begun, problem: Problem, settings: RoomSettings) -> Observations:
-    """The data of `problem`, as vertices of the room that was begun see them."""
-    stated = begun.problem
+def data_of(background: Background, problem: Problem, settings: RoomSettings) -> Observations:
+    """The data of `problem`, as vertices of the room that was background see them."""
+    stated = background.problem
     of = Problem(stated.scene, problem.shifts, stated.planes, stated.sensors)
     return observations(of, (settings.vertices, settings.vertices, settings.vertices))
 
 
-def fitted_room(begun: Begun, problem: Problem, settings: RoomSettings, tell: Event) -> Solved:
+def fitted_room(background: Background, problem: Problem, settings: RoomSettings, report: Event) -> Analysis:
     """Parameters and level that measurements ask for, and what deviations are made of."""
-    coarse, fine, prior = begun.coarse, begun.fine, begun.prior
+    coarse, fine, prior = background.coarse, background.fine, background.prior
     vertices = (settings.vertices, settings.vertices, settings.vertices)
-    data = data_of(begun, problem, settings)
-    vector, base, linearised = coarse_fit(begun, data, settings, tell)
-    other = otherwise_closed(coarse, prior.parameters(vector), base, settings, vertices)
-    first = begun.first
+    data = data_of(background, problem, settings)
+    vector, base, linearised = coarse_fit(background, data, settings, report)
+    other = run_under_other_closure(coarse, prior.parameters(vector), base, settings, vertices)
+    first = background.first
     seconds = settings.refine_s + (0.0 if settings.use_images else settings.final_s)
     if np.any(vector) or not settings.use_images:
-        first = attempt(fine, prior.parameters(vector), first.flow.last, seconds, vertices, tell)
+        first = march_under(fine, prior.parameters(vector), first.flow.last, seconds, vertices, report)
 
-    def made_again(where: Vector) -> Derivatives:
+    def renewed(where: Vector) -> Derivatives:
         return perturbed(coarse, prior, where, base, settings, vertices)
 
     derivatives = linearised
     if settings.use_images and prior.unknown_walls():
-        found, derivatives = fine_search(fine, prior, data, first, linearised, made_again, settings, tell)
+        found, derivatives = fine_search(fine, prior, data, first, linearised, renewed, settings, report)
     else:
-        found = fine_fit(fine, prior, data, vector, first, linearised, settings, tell)
+        found = fine_fit(fine, prior, data, vector, first, linearised, settings, report)
     before = best = found.room
     if settings.use_images:
-        best = held_fit(fine, prior, data, before, derivatives, settings, tell)
-    return Solved(
-        begun.problem,
+        best = held_fit(fine, prior, data, before, derivatives, settings, report)
+    return Analysis(
+        background.problem,
         data,
         prior,
         found.posterior,
         derivatives,
         coarse=linearised.start,
-        first=first.seen,
+        first=first.fields,
         other=other,
         before=before,
         best=best,
@@ -138,7 +144,7 @@ def fitted_room(begun: Begun, problem: Problem, settings: RoomSettings, tell: Ev
     )
 
 
-def supplied(layout: RoomLayout, best: Attempt) -> dict[str, float]:
+def supplied(layout: RoomLayout, best: ForwardRun) -> dict[str, float]:
     """Excess temperature and speed of every supply in the room that was found."""
     found: dict[str, float] = {}
     for n, velocity in enumerate(layout.inlet_velocity_m_s):

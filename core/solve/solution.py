@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import equinox as eqx
 import numpy as np
 
-from core.losses.boussinesq import Flow
+from core.losses.boussinesq import FlowValues
 from core.losses.representation import Spans, Unknowns, positions
 from core.result import Outcome, Solution
 from core.solve.nondimensional import Frame
@@ -42,7 +42,7 @@ def solution_of(
 
 
 @eqx.filter_jit
-def _evaluate(unknowns: Unknowns, spans: Spans) -> Flow:
+def _evaluate(unknowns: Unknowns, spans: Spans) -> FlowValues:
     return unknowns.representation.fields().on_grid(spans)
 
 

@@ -21,7 +21,7 @@ from app.bench.room_fit import coverage, problem_of
 from app.volume.score import score_solution
 from core.problem import Problem
 from core.scene import BoundaryInformation, Heater, Inlet, Outlet, Wall
-from core.solve.room import RoomSettings, begin, finish
+from core.solve.room import RoomSettings, analyse, background_of
 
 
 def main() -> None:
@@ -37,14 +37,14 @@ def main() -> None:
     settings = RoomSettings(cells=options.cells, coarse_cells=options.coarse)
     for path in options.truth:
         for information in options.information:
-            began_s, begun = time.process_time(), None
+            began_s, background = time.process_time(), None
             for seed in options.seeds:
                 problem, volume = problem_of(path, information, "texture", "paper", seed)
                 if options.misread:
-                    problem, begun = misread(problem, seed), None
+                    problem, background = misread(problem, seed), None
                 # Without misreadings the coarse room as stated, and its derivatives, serve all seeds.
-                begun = begun or begin(problem, settings, lambda _: None)
-                found = finish(begun, problem, settings, lambda _: None, start_s=time.perf_counter())
+                background = background or background_of(problem, settings, lambda _: None)
+                found = analyse(background, problem, settings, lambda _: None, start_s=time.perf_counter())
                 scores = score_solution(found, volume)
                 row = {"truth": path.stem, "information": information, "seed": seed, "cells": options.cells}
                 row |= {

@@ -10,7 +10,7 @@ import time
 import jax
 import jax.numpy as jnp
 
-from core.losses.boussinesq import Flow, Numbers, residuals
+from core.losses.boussinesq import FlowValues, Numbers, residuals
 from core.mlp import Mlp, MlpSettings, initial_mlp
 from tests.benchmarks.options import whole_numbers
 
@@ -22,7 +22,7 @@ def nested(network: Mlp, points):
 
     def one(point):
         flow = network.at(point[None])
-        return Flow(flow.temperature[0], flow.pressure[0], flow.velocity[0])
+        return FlowValues(flow.temperature[0], flow.pressure[0], flow.velocity[0])
 
     def laplacian(point):
         hessian = jax.jacfwd(jax.jacfwd(one))(point)

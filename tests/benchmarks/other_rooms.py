@@ -22,10 +22,10 @@ from app.volume.file import RoomVolume
 from app.volume.scene import RigOptions, room_scene
 from core.estimate.prior import room_prior
 from core.problem import Problem
-from core.room.forward import Room, carried_over, room, seen
-from core.room.grid import AXES
+from core.room.forward import Room, carried_over, room, room_fields
 from core.room.march import MarchSettings, march
-from core.room.model import RoomModel
+from core.room.room_grid import AXES
+from core.room.step import RoomModel
 from core.room.vertices import cell_matrix
 
 T0_K, NU, PRANDTL = 293.15, 1.5e-5, 0.71
@@ -173,7 +173,7 @@ def _empty(name: str, what: Made) -> RoomVolume:
 
 def _arrays(what: Made, volume: RoomVolume, fine: Room, model: RoomModel, flow: Any) -> dict[str, Any]:
     """The volume's arrays, named as in the format."""
-    field = seen(flow, model, what.vertices)
+    field = room_fields(flow, model, what.vertices)
     nut = np.asarray(model.viscosity(flow).cells_m2_s) - NU
     for a in AXES:
         edge = [(1, 1) if b == a else (0, 0) for b in AXES]

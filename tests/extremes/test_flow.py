@@ -8,7 +8,7 @@ import numpy as np
 from core.air import Air
 from core.estimate.uncertainty import Represented, deviation
 from core.grid import Staggered, StaggeredGrid, discrete_residuals
-from core.losses.boussinesq import Flow, Numbers, Scales, residuals, scales
+from core.losses.boussinesq import FlowValues, Numbers, Scales, residuals, scales
 from core.metrics import score_pressure, score_temperature, score_velocity
 from tests.extremes.row import Near, Refused, Row, Within, extremes, prove
 
@@ -27,8 +27,8 @@ def point(reynolds: float, richardson: float, peclet: float) -> Row:
     def run() -> np.ndarray:
         f32 = lambda v: jnp.asarray(v, jnp.float32)  # noqa: E731
         found = residuals(
-            Flow(f32(T), f32(P), f32(U)), Flow(f32(GRAD_T), f32(GRAD_P), f32(GRAD_U)),
-            Flow(f32(LAP_T), f32(0.0), f32(LAP_U)),
+            FlowValues(f32(T), f32(P), f32(U)), FlowValues(f32(GRAD_T), f32(GRAD_P), f32(GRAD_U)),
+            FlowValues(f32(LAP_T), f32(0.0), f32(LAP_U)),
             Numbers(reynolds=reynolds, peclet=peclet, richardson=richardson),
         )  # fmt: skip
         return np.concatenate([np.ravel(found.mass), np.ravel(found.momentum), np.ravel(found.heat)])

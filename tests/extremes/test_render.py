@@ -9,7 +9,7 @@ from core.fields import GridField
 from core.geometry import Box, Optics, looking_along_y
 from core.rays import StraightTracer
 from core.render import pixel_geometry, render_flow, render_reference
-from core.render.choice import choose
+from core.render.render_choice import choose
 from core.render.shift import pattern_offset_px, wall_offset_m
 from core.scene import (
     CheckerPattern,

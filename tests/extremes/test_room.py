@@ -6,12 +6,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from core.geometry import Box, looking_along_y
-from core.room.boundary import closed_room
 from core.room.boundary_conditions import room_layout
 from core.room.closure import ConstantClosure
-from core.room.grid import RoomGrid, room_grid
 from core.room.march import MarchSettings, march
-from core.room.model import air_at_rest, room_model
+from core.room.room_grid import RoomGrid, room_grid
+from core.room.step import air_at_rest, room_model
+from core.room.wall_planes import closed_room
 from core.scene import FixedTexture, Heater, Inlet, Outlet, Patch, Scene, View, Wall
 from tests.extremes.row import Near, Refused, Row, Within, extremes, prove
 

@@ -11,7 +11,7 @@ from core.fields import GridField
 from core.geometry import looking_along_y
 from core.rays import StraightTracer
 from core.rays.operator import StraightRayOperator, build
-from core.render.geometry import pixel_geometry
+from core.render.pixel_geometry import pixel_geometry
 from core.scene import FixedTexture, Scene, View
 
 _WINDOW_PX = 27.0

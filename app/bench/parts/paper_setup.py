@@ -15,8 +15,8 @@ from app.volume.scene import RigOptions, room_scene
 from core.fields import GridField
 from core.problem import ImagePair, Problem
 from core.rays import NonlinearTracer
-from core.render.geometry import PixelGeometry, pixel_geometry
 from core.render.light import pattern_image, sample_pattern
+from core.render.pixel_geometry import PixelGeometry, pixel_geometry
 from core.render.shift import pattern_offset_px, wall_offset_m
 from core.scene import Scene, SolveModel
 

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import RegularGridInterpolator
 
-from core.losses.boussinesq import Flow
+from core.losses.boussinesq import FlowValues
 from core.losses.representation import Spans, positions
 from core.problem import Problem
 from core.scene import SolveModel
@@ -24,7 +24,7 @@ from core.solve.nondimensional import Frame, height_profile, outlet_height
 _DRAFT_CELLS = 24
 
 
-def starting_flow(problem: Problem, frame: Frame, spans: Spans, regime: str) -> Flow:
+def starting_flow(problem: Problem, frame: Frame, spans: Spans, regime: str) -> FlowValues:
     """The known plane's profile; without one `draft`'s temperature where the regime uses images."""
     if problem.planes or not problem.shifts or "bos" not in regime or not known_air_k(problem):
         return height_profile(problem, frame, spans)
@@ -42,7 +42,7 @@ def starting_flow(problem: Problem, frame: Frame, spans: Spans, regime: str) -> 
     temperature = (kelvin - scales.reference_k) / scales.excess_k
     column = frame.numbers.richardson * _column(temperature.mean((0, 1)), positions(spans[2]), problem, frame)
     pressure = np.broadcast_to(column, temperature.shape)
-    return Flow(
+    return FlowValues(
         jnp.asarray(temperature, jnp.float32),
         jnp.asarray(pressure, jnp.float32),
         jnp.zeros((*temperature.shape, 3)),

@@ -9,13 +9,13 @@ def test_the_closure_is_not_let_go_in_a_wrong_supplys_place():
     # Data that see only the sum of two parameters, a supply and the closure's viscosity: ten deviations away.
     jacobian, residual, variance = np.ones((8, 2)), np.zeros(8), np.ones(8)
 
-    def moved(firm: list[bool]) -> np.ndarray:
-        return gauss_newton(np.array([5.0, 5.0]), residual, variance, jacobian, np.array(firm)).vector
+    def moved(gaussian: list[bool]) -> np.ndarray:
+        return gauss_newton(np.array([5.0, 5.0]), residual, variance, jacobian, np.array(gaussian)).vector
 
-    # Were both priors Student's, nothing would tell the two apart.
+    # Were both priors Student's, nothing would report the two apart.
     same = moved([False, False])
     assert same[0] == pytest.approx(same[1])
-    # A firm one pulls as far as one step may go (three deviations), and the supply takes it up.
+    # A gaussian one pulls as far as one step may go (three deviations), and the supply takes it up.
     entry, closure = moved([False, True])
     assert closure == pytest.approx(2.0)
     assert entry > 7.0
@@ -24,7 +24,9 @@ def test_the_closure_is_not_let_go_in_a_wrong_supplys_place():
 def test_where_all_are_trusted_both_move_alike():
     jacobian, residual, variance = np.ones((8, 2)), np.full(8, 2.0), np.ones(8)
 
-    found = gauss_newton(np.zeros(2), residual, variance, jacobian, np.array([False, True]), trusting=True)
+    found = gauss_newton(
+        np.zeros(2), residual, variance, jacobian, np.array([False, True]), all_gaussian=True
+    )
 
     # 8 (2 - a - b) = a = b.
     assert found.vector == pytest.approx(np.full(2, 16.0 / 17.0))
@@ -36,8 +38,8 @@ def test_a_damped_step_keeps_parameters_together_that_make_up_for_one_another():
     residual, variance = np.array([0.0, 100.0]), np.full(2, 1e-4)
 
     def step(reach: float) -> np.ndarray:
-        firm = np.array([True, True])
-        return gauss_newton(np.zeros(2), residual, variance, jacobian, firm, reach=reach).vector
+        gaussian = np.array([True, True])
+        return gauss_newton(np.zeros(2), residual, variance, jacobian, gaussian, trust_radius=reach).vector
 
     near, far = step(0.5), step(2.0)
     for reached, reach in ((near, 0.5), (far, 2.0)):

@@ -7,9 +7,9 @@ import pytest
 
 from core.estimate.diagnostics import undetermined
 from core.estimate.forward_runs import Derivatives, differences
-from core.estimate.observation import Prediction
 from core.problem import Problem
-from core.room.grid import WALLS
+from core.room.room_grid import WALLS
+from core.room.vertices import RoomFields
 from core.scene import FlowModel, Wall
 from tests.core.estimate.test_temperature_nudging import VERTICES, prior_of, problem
 
@@ -54,19 +54,19 @@ def test_where_one_of_them_is_stated_the_other_is_fitted_alone(known: str):
 def test_unknown_walls_are_not_let_go_and_moved_a_little_only():
     unknown, stated = prior_of(problem(stated=False)), prior_of(with_walls(**dict.fromkeys(WALLS, 293.15)))
 
-    firm = dict(zip(unknown.names(), unknown.firm(), strict=True))
+    gaussian = dict(zip(unknown.names(), unknown.gaussian(), strict=True))
     small = dict(zip(unknown.names(), differences(unknown) < 1.0, strict=True))
 
-    assert {n for n, f in firm.items() if not f} == {"inlet_excess_k[0]", "inlet_log_flow[0]"}
-    assert {n for n, f in small.items() if f} == {n for n in firm if n.startswith(("wall", "log_heat"))}
+    assert {n for n, f in gaussian.items() if not f} == {"inlet_excess_k[0]", "inlet_log_flow[0]"}
+    assert {n for n, f in small.items() if f} == {n for n in gaussian if n.startswith(("wall", "log_heat"))}
     # A stated wall's heat coefficient may have been entered wrongly.
-    assert not dict(zip(stated.names(), stated.firm(), strict=True))["log_heat"]
+    assert not dict(zip(stated.names(), stated.gaussian(), strict=True))["log_heat"]
     assert np.all(differences(stated) > 1.0)
 
 
 def test_derivatives_are_per_prior_deviation_whatever_the_steps():
-    def room_of(excess_k: float) -> Prediction:
-        return Prediction(
+    def room_of(excess_k: float) -> RoomFields:
+        return RoomFields(
             np.full(VERTICES, excess_k), np.zeros(VERTICES), np.zeros((*VERTICES, 3)), 2.0 * excess_k
         )
 
@@ -92,4 +92,4 @@ def test_one_viscosity_that_nobody_stated_may_vary_over_the_room(flow: FlowModel
     lattice = [name for name in prior.names() if name.startswith("log_viscosity")]
 
     assert len(lattice) == (36 if fitted else 0)
-    assert all(prior.firm()[[name in lattice for name in prior.names()]])
+    assert all(prior.gaussian()[[name in lattice for name in prior.names()]])

@@ -1,4 +1,4 @@
-"""A held room: what is told of the heat that it took, and that its level is not corrected twice."""
+"""A held room: what is reported of the heat that it took, and that its level is not corrected twice."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from core.estimate.diagnostics import balances
-from core.estimate.observation import Prediction, observations
+from core.estimate.observation import observations
 from core.estimate.prior import Prior, room_prior
 from core.estimate.temperature_nudging import unheld
 from core.geometry import Box, looking_along_y
 from core.problem import Problem
 from core.room.forward import room
-from core.room.grid import WALLS
+from core.room.room_grid import WALLS
+from core.room.vertices import RoomFields
 from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, View, Wall
 
 VERTICES = (9, 8, 7)
@@ -51,10 +52,10 @@ def test_a_room_that_was_held_goes_back_to_its_own_level_and_where_walls_are_unk
     data, free = observations(given, VERTICES), np.ones(VERTICES)
     still = np.zeros((*VERTICES, 3))
     own = np.random.default_rng(0).normal(5.0, 0.2, VERTICES)
-    before = Prediction(own, np.zeros(VERTICES), still, 5.0)
+    before = RoomFields(own, np.zeros(VERTICES), still, 5.0)
     # 0.1 K warmer at the floor, 0.7 K at the ceiling; the outlet's middle is a quarter up.
     warmer = np.linspace(0.1, 0.7, VERTICES[2])
-    held = Prediction(own + warmer, np.zeros(VERTICES), still, 5.5)
+    held = RoomFields(own + warmer, np.zeros(VERTICES), still, 5.5)
 
     back = unheld(held, before, data, prior_of(given), free)
 

@@ -64,7 +64,7 @@ def test_a_strip_s_heat_is_fitted_and_its_temperature_shown_nowhere():
     assert heaters == [f"heater_excess_k[{n}]" for n in range(5)]
     assert prior.suspected().sum() == 5
     # Beside suspected heat, nothing that was entered is let go as well.
-    np.testing.assert_array_equal(prior.firm(), ~prior.suspected())
+    np.testing.assert_array_equal(prior.gaussian(), ~prior.suspected())
     np.testing.assert_allclose(differences(prior)[prior.suspected()], 1.0)
     assert layout.shown == (False,) * 5
     assert float(floor.wall_excess_k.max()) > 20.0

@@ -6,7 +6,7 @@ import pytest
 from core.grid import Staggered, StaggeredGrid, discrete_residuals
 from core.grid.interpolation import interpolation_matrix
 from core.grid.multiresolution import MultiGrid, prolong, zero_multigrid
-from core.losses.boussinesq import Flow, Numbers, residuals
+from core.losses.boussinesq import FlowValues, Numbers, residuals
 
 NUMBERS = Numbers(reynolds=40.0, peclet=30.0, richardson=2.5)
 LOWER, UPPER = (0.0, 0.0, 0.0), (1.4, 1.0, 1.0)
@@ -38,7 +38,7 @@ def continuous(points):
 
     def one(point):
         t, p, u, v, w = exact(*point)
-        return Flow(t, p, jnp.stack([u, v, w]))
+        return FlowValues(t, p, jnp.stack([u, v, w]))
 
     def at(point):
         hessian = jax.jacfwd(jax.jacfwd(one))(point)
@@ -125,7 +125,7 @@ def test_a_finer_level_of_zeros_leaves_a_linear_state_as_it_is():
     multigrid = zero_multigrid(StaggeredGrid(LOWER, UPPER, (8, 8, 8)))
     linear = multigrid.grids[0].of_fields(
         ((np.array([0.0, 1.4])), np.array([0.0, 1.0]), np.array([0.0, 1.0])),
-        Flow(jnp.arange(8.0).reshape(2, 2, 2), jnp.zeros((2, 2, 2)), jnp.ones((2, 2, 2, 3))),
+        FlowValues(jnp.arange(8.0).reshape(2, 2, 2), jnp.zeros((2, 2, 2)), jnp.ones((2, 2, 2, 3))),
     )
     start = MultiGrid((linear, *multigrid.levels[1:]), multigrid.grids)
     fine = start.refined()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.air import Air
-from core.losses.boussinesq import Flow, Numbers, residuals, scales
+from core.losses.boussinesq import FlowValues, Numbers, residuals, scales
 from core.setting import SettingError
 
 NUMBERS = Numbers(reynolds=40.0, peclet=30.0, richardson=2.5)
@@ -15,7 +15,7 @@ NUMBERS = Numbers(reynolds=40.0, peclet=30.0, richardson=2.5)
 def slot(x):
     """Conduction between a hot and a cold wall drives a cubic velocity profile (Batchelor 1954)."""
     drive = NUMBERS.reynolds * NUMBERS.richardson
-    return Flow(x[0], 0.0 * x[0], jnp.array([0.0, 0.0, drive * (x[0] - x[0] ** 3) / 6]))
+    return FlowValues(x[0], 0.0 * x[0], jnp.array([0.0, 0.0, drive * (x[0] - x[0] ** 3) / 6]))
 
 
 def stratified_rolls(x):
@@ -24,7 +24,7 @@ def stratified_rolls(x):
     s = -(k**4) / (NUMBERS.reynolds * NUMBERS.richardson * NUMBERS.peclet)
     swing = k**2 / (NUMBERS.reynolds * NUMBERS.richardson) * jnp.sin(k * x[0])
     pressure = NUMBERS.richardson * s * x[2] ** 2 / 2
-    return Flow(s * x[2] + swing, pressure, jnp.array([0.0, 0.0, jnp.sin(k * x[0])]))
+    return FlowValues(s * x[2] + swing, pressure, jnp.array([0.0, 0.0, jnp.sin(k * x[0])]))
 
 
 def kovasznay(x):
@@ -36,7 +36,7 @@ def kovasznay(x):
         [1 - envelope * jnp.cos(phase), decay / (2 * math.pi) * envelope * jnp.sin(phase), 0.0]
     )
     pressure = (1 - envelope**2) / 2 + NUMBERS.richardson * x[2] ** 2 / 2
-    return Flow(x[2], pressure, velocity)
+    return FlowValues(x[2], pressure, velocity)
 
 
 def derivatives(flow, x):
@@ -61,9 +61,9 @@ def test_a_wrong_peclet_number_leaves_heat():
 
 
 def test_gravity_points_down_hot_air_is_driven_up():
-    zero = Flow(jnp.array(0.0), jnp.array(0.0), jnp.zeros(3))
-    flat = Flow(jnp.zeros(3), jnp.zeros(3), jnp.zeros((3, 3)))
-    hot = Flow(jnp.array(1.0), jnp.array(0.0), jnp.zeros(3))
+    zero = FlowValues(jnp.array(0.0), jnp.array(0.0), jnp.zeros(3))
+    flat = FlowValues(jnp.zeros(3), jnp.zeros(3), jnp.zeros((3, 3)))
+    hot = FlowValues(jnp.array(1.0), jnp.array(0.0), jnp.zeros(3))
     # The residual is minus the acceleration of a parcel at rest.
     assert float(residuals(hot, flat, zero, NUMBERS).momentum[2]) == pytest.approx(-2.5)
 

@@ -14,8 +14,8 @@ from core.losses.traced import TracedLoss, rendered_view, traced_windows
 from core.mlp import MlpSettings, initial_mlp
 from core.problem import ImagePair, ShiftMeasurement
 from core.rays.operator import build
-from core.render.geometry import pixel_geometry
 from core.render.light import pattern_image, sample_pattern
+from core.render.pixel_geometry import pixel_geometry
 from core.scene import FixedTexture, ProjectedPattern, Scene, View
 from core.setting import SettingError
 

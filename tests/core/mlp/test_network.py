@@ -3,7 +3,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.losses.boussinesq import Flow
+from core.losses.boussinesq import FlowValues
 from core.mlp import MlpSettings, initial_mlp
 from core.setting import SettingError
 
@@ -57,7 +57,7 @@ def test_fourier_frequencies_are_fixed():
     points = jax.random.uniform(jax.random.key(0), (5, 3))
 
     def loss(net):
-        flow: Flow = net.with_derivatives(points)[2]
+        flow: FlowValues = net.with_derivatives(points)[2]
         return (flow.velocity**2).sum() + (net.at(points).temperature ** 2).sum()
 
     gradient = jax.grad(loss)(network)

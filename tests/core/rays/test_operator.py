@@ -11,7 +11,7 @@ from core.rays.gathered import GatheredPaths
 from core.rays.operator import build
 from core.rays.optics import pinhole
 from core.rays.straight import StraightTracer
-from core.render.geometry import pixel_geometry
+from core.render.pixel_geometry import pixel_geometry
 from core.render.shift import wall_offset_m
 from core.scene import FixedTexture, ProjectedPattern, Scene, View
 

@@ -8,8 +8,8 @@ import pytest
 
 from core.fields import GridField
 from core.render import pixel_renderer, render_flow, render_reference
-from core.render.choice import choose
 from core.render.pixel_filter import monte_carlo, quadrature
+from core.render.render_choice import choose
 from core.scene import FixedTexture, ProjectedPattern, RayModel, View
 from core.setting import SettingError
 from tests.core.render.test_image import CAMERA, PROJECTOR, ROOM, scene

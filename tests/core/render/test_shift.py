@@ -10,8 +10,8 @@ from core.fields import plume
 from core.geometry import looking_along_y
 from core.rays import NonlinearTracer
 from core.rays.yardstick import exact_wall_shift_m
-from core.render.geometry import pixel_geometry
 from core.render.irradiance import irradiance_factor
+from core.render.pixel_geometry import pixel_geometry
 from core.render.shift import aim, pattern_offset_px, wall_offset_m
 from core.scene import ProjectedPattern, Scene, View
 from tests.core.rays.scenes import AIR, N0, ROOM, rays_from, single, wall_points

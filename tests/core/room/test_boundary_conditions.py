@@ -8,16 +8,16 @@ from core.estimate.prior import room_prior
 from core.estimate.temperature_nudging import free_vertices
 from core.geometry import Box, looking_along_y
 from core.problem import Problem
-from core.room.boundary import closed_room
 from core.room.boundary_conditions import RoomParameters, boundary, room_layout
 from core.room.closure import ConstantClosure, KEpsilonClosure
-from core.room.grid import room_grid
 from core.room.k_epsilon import wall_sources
 from core.room.level import layer_exchange_m3_s
 from core.room.march import advance_chunk
-from core.room.model import air_at_rest, room_model
 from core.room.pressure import divergence_per_s
+from core.room.room_grid import room_grid
+from core.room.step import air_at_rest, room_model
 from core.room.vertices import vertex_excess_k, vertex_velocity_m_s
+from core.room.wall_planes import closed_room
 from core.scene import FixedTexture, Heater, Inlet, Outlet, Patch, Scene, View, Wall
 from core.setting import SettingError
 
@@ -81,7 +81,7 @@ def test_a_free_surface_has_no_wall_function():
     k = jnp.full(grid.cells, 1e-3)
     u, v, w = (jnp.full([n + (a == b) for b, n in enumerate(grid.cells)], 0.1, jnp.float32) for a in range(3))
     velocity = (u, v, w)
-    still, free = closed_room(grid), closed_room(grid, grip=0.0)
+    still, free = closed_room(grid), closed_room(grid, no_slip=0.0)
 
     touched, production, _ = wall_sources(k, velocity, still, grid, jnp.float32(1.5e-5))
     assert float(touched[0, 0, 0]) == 3.0

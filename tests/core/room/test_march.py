@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from core.result import Outcome
-from core.room.boundary import Boundary, WallPlane, closed_room
 from core.room.closure import ConstantClosure
-from core.room.grid import RoomGrid
 from core.room.march import MarchSettings, march
-from core.room.model import RoomModel, air_at_rest, longest_step_s, room_model
+from core.room.room_grid import RoomGrid
+from core.room.step import RoomModel, air_at_rest, longest_step_s, room_model
+from core.room.wall_planes import Boundary, WallPlane, closed_room
 from core.setting import SettingError
 
 
 def slippery(wall: WallPlane) -> WallPlane:
-    return eqx.tree_at(lambda w: w.grip, wall, jnp.float32(0.0))
+    return eqx.tree_at(lambda w: w.no_slip, wall, jnp.float32(0.0))
 
 
 def flat_room(cells: int, viscosity: float, walls_x: tuple, walls_z: tuple, buoyancy: float) -> RoomModel:

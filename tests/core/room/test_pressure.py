@@ -3,8 +3,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.room.grid import RoomGrid
 from core.room.pressure import divergence_per_s, pressure_solver, project
+from core.room.room_grid import RoomGrid
 
 GRID = RoomGrid(cells=(6, 5, 7), lower_m=(0.0, 0.0, 0.0), spacing_m=(0.1, 0.2, 0.15))
 

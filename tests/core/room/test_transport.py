@@ -3,9 +3,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.room.boundary import closed_room
-from core.room.grid import RoomGrid, closed, face_mean
+from core.room.room_grid import RoomGrid, closed, face_mean
 from core.room.transport import limited_flux, scalar_rate
+from core.room.wall_planes import closed_room
 
 GRID = RoomGrid(cells=(8, 6, 7), lower_m=(0.0, 0.0, 0.0), spacing_m=(0.1, 0.2, 0.15))
 

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from core.losses.boussinesq import Flow, Numbers, residuals
+from core.losses.boussinesq import FlowValues, Numbers, residuals
 from core.mlp import Mlp, MlpSettings, initial_mlp
 
 # Weight of a wall's errors over the residuals' within. With 10 the walls hide the equations for a hundred steps.
@@ -33,14 +33,14 @@ class Term(eqx.Module):
     weight: Float[Array, " points"]
 
 
-def flow_at(network: Mlp, points: Points) -> tuple[Flow, Flow, Flow]:
+def flow_at(network: Mlp, points: Points) -> tuple[FlowValues, FlowValues, FlowValues]:
     """Values, slopes, Laplacians of a flow without velocity along y, the network being one that knows no y."""
     value, slope, laplacian = network.with_derivatives(points)
     still = jnp.array([1.0, 0.0, 1.0])
     return (
-        Flow(value.temperature, value.pressure, value.velocity * still[None]),
-        Flow(slope.temperature, slope.pressure, slope.velocity * still[None, :, None]),
-        Flow(laplacian.temperature, laplacian.pressure, laplacian.velocity * still[None]),
+        FlowValues(value.temperature, value.pressure, value.velocity * still[None]),
+        FlowValues(slope.temperature, slope.pressure, slope.velocity * still[None, :, None]),
+        FlowValues(laplacian.temperature, laplacian.pressure, laplacian.velocity * still[None]),
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from core.geometry import Box, looking_along_y
 from core.known import VertexGrid
-from core.losses.boundary import level_loss
+from core.losses.boundary_loss import level_loss
 from core.losses.representation import Unknowns
 from core.problem import Problem, ShiftMeasurement
 from core.rays.operator import build

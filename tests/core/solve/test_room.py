@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from core.estimate.alternatives import promising_closure
-from core.estimate.forward_runs import Derivatives, attempt
+from core.estimate.forward_runs import Derivatives, march_under
 from core.estimate.heaters import heaters_by_march
 from core.estimate.levenberg_marquardt import fine_search
 from core.estimate.observation import observations
-from core.estimate.parameter_fit import Begun, coarse_fit, fine_fit
+from core.estimate.parameter_fit import Background, coarse_fit, fine_fit
 from core.estimate.parameter_step import misfit_ratio
-from core.estimate.posterior import Solved, solution
+from core.estimate.posterior import Analysis, solution
 from core.geometry import Box, looking_along_y
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
@@ -21,7 +21,7 @@ from core.result import Solution
 from core.scene import FixedTexture, FlowModel, Heater, Inlet, Outlet, Patch, Scene, View, Wall
 from core.solve.room import (
     RoomSettings,
-    begin,
+    background_of,
     fitted_room,
     solve_room,
 )
@@ -97,7 +97,7 @@ def test_images_repair_a_supply_that_was_entered_wrongly(truth: Solution):
     # Entered 2 K too warm and 20 % too fast; marches this short leave a tenth of a kelvin and a few per cent.
     assert warmest_k == pytest.approx(true_warmest_k, abs=0.2)
     assert flow == pytest.approx(true_flow, rel=0.05)
-    # The operator is told.
+    # The operator is reported.
     assert any("than the 305.15 K entered" in note for note in found.notes)
     assert found.temperature_std_k.min() > 0
     assert found.informed.max() > 0.3
@@ -106,67 +106,83 @@ def test_images_repair_a_supply_that_was_entered_wrongly(truth: Solution):
 def test_derivatives_that_point_the_wrong_way_leave_a_room_no_worse_than_stated(truth: Solution):
     wrong = replace(SUPPLY, temperature_k=304.15, velocity_m_s=(0.44, 0.0, 0.0))
     problem = measured(scene(wrong), truth, 1e-5)
-    begun = begin(problem, SETTINGS, lambda _: None)
+    background = background_of(problem, SETTINGS, lambda _: None)
     data = observations(problem, (SETTINGS.vertices,) * 3)
-    turned = eqx.tree_at(lambda d: d.steps, begun.derivatives, -begun.derivatives.steps)
-    told: list[dict] = []
-    vector = np.zeros(len(begun.prior.active()))
+    turned = eqx.tree_at(lambda d: d.steps, background.derivatives, -background.derivatives.steps)
+    reported: list[dict] = []
+    vector = np.zeros(len(background.prior.active()))
     settings = replace(SETTINGS, rounds=2, final_s=10.0)
-    best = fine_fit(begun.fine, begun.prior, data, vector, begun.first, turned, settings, told.append)
+    best = fine_fit(
+        background.fine, background.prior, data, vector, background.first, turned, settings, reported.append
+    )
 
-    assert max(event.get("misfit_left", 0.0) for event in told) > 1.15
-    assert misfit_ratio(data, best.room, begun.first) <= 1.05
+    assert max(event.get("misfit_left", 0.0) for event in reported) > 1.15
+    assert misfit_ratio(data, best.room, background.first) <= 1.05
 
 
 @pytest.fixture(scope="module")
-def unknown_walls(truth: Solution) -> Begun:
+def unknown_walls(truth: Solution) -> Background:
     """The room of which nobody stated the walls."""
     where = scene(SUPPLY)
     openings = tuple(part for part in where.boundary if not isinstance(part, Wall))
-    return begin(measured(replace(where, boundary=openings), truth, 1e-5), SETTINGS, lambda _: None)
+    return background_of(measured(replace(where, boundary=openings), truth, 1e-5), SETTINGS, lambda _: None)
 
 
-def test_derivatives_are_made_again_where_unknown_walls_have_moved(unknown_walls: Begun):
-    begun = unknown_walls
-    settings = replace(SETTINGS, rounds=3, again=1, straight_walls=0.0, fine_step=0.0)
-    data = observations(begun.problem, (settings.vertices,) * 3)
+def test_derivatives_are_made_again_where_unknown_walls_have_moved(unknown_walls: Background):
+    background = unknown_walls
+    settings = replace(SETTINGS, rounds=3, renewals=1, jacobian_valid_walls=0.0, fine_step=0.0)
+    data = observations(background.problem, (settings.vertices,) * 3)
     moved_to: list[np.ndarray] = []
-    told: list[dict] = []
+    reported: list[dict] = []
 
-    def made_again(vector: np.ndarray) -> Derivatives:
+    def renewed(vector: np.ndarray) -> Derivatives:
         moved_to.append(vector)
-        return begun.derivatives
+        return background.derivatives
 
     # A coarse room's own errors would move walls that nobody knows.
-    assert not np.any(coarse_fit(begun, data, settings, told.append)[0])
+    assert not np.any(coarse_fit(background, data, settings, reported.append)[0])
     fine_search(
-        begun.fine, begun.prior, data, begun.first, begun.derivatives, made_again, settings, told.append
+        background.fine,
+        background.prior,
+        data,
+        background.first,
+        background.derivatives,
+        renewed,
+        settings,
+        reported.append,
     )
 
-    rounds = [event for event in told if "round" in event]
+    rounds = [event for event in reported if "round" in event]
     assert len(moved_to) == 1
     # After the second round, from the room that was nearest to the data by then.
     kept = [event for event in rounds[:2] if event["misfit_left"] < 1.0][-1]
-    np.testing.assert_allclose(moved_to[0], [kept[name] for name in begun.prior.names()])
+    np.testing.assert_allclose(moved_to[0], [kept[name] for name in background.prior.names()])
 
 
-def test_a_search_whose_derivatives_mislead_comes_back_and_learns(unknown_walls: Begun):
-    begun = unknown_walls
-    data = observations(begun.problem, (SETTINGS.vertices,) * 3)
-    turned = eqx.tree_at(lambda d: d.steps, begun.derivatives, -begun.derivatives.steps)
-    told: list[dict] = []
-    settings = replace(SETTINGS, rounds=2, again=0, fine_step=0.0)
+def test_a_search_whose_derivatives_mislead_comes_back_and_learns(unknown_walls: Background):
+    background = unknown_walls
+    data = observations(background.problem, (SETTINGS.vertices,) * 3)
+    turned = eqx.tree_at(lambda d: d.steps, background.derivatives, -background.derivatives.steps)
+    reported: list[dict] = []
+    settings = replace(SETTINGS, rounds=2, renewals=0, fine_step=0.0)
     best, _ = fine_search(
-        begun.fine, begun.prior, data, begun.first, turned, lambda _: turned, settings, told.append
+        background.fine,
+        background.prior,
+        data,
+        background.first,
+        turned,
+        lambda _: turned,
+        settings,
+        reported.append,
     )
 
-    rounds = [event for event in told if "round" in event]
-    first, second = ([event[name] for name in begun.prior.names()] for event in rounds)
+    rounds = [event for event in reported if "round" in event]
+    first, second = ([event[name] for name in background.prior.names()] for event in rounds)
     assert rounds[0]["misfit_left"] > 1.0
     # The second step starts from where the first did, is shorter, and does not go the same way again.
     assert np.abs(second).max() <= 0.5 * np.abs(first).max() + 1e-9
     assert np.dot(first, second) < 0.5 * np.dot(first, first)
-    assert misfit_ratio(data, best.room, begun.first) <= 1.0
+    assert misfit_ratio(data, best.room, background.first) <= 1.0
 
 
 @pytest.mark.parametrize(("transport", "wanted"), [("auto", "zero_equation"), ("k_epsilon", None)])
@@ -174,19 +190,19 @@ def test_another_closure_is_tried_where_it_leaves_less_of_the_images(
     truth: Solution, transport: Literal["auto", "k_epsilon"], wanted: str | None
 ):
     problem = measured(scene(SUPPLY, FlowModel(transport=transport)), truth, 1e-5)
-    begun = begin(problem, SETTINGS, lambda _: None)
-    fitted = fitted_room(begun, problem, SETTINGS, lambda _: None)
+    background = background_of(problem, SETTINGS, lambda _: None)
+    fitted = fitted_room(background, problem, SETTINGS, lambda _: None)
     # As if either room were the truth itself, a share of it, or no room at all.
     true_k = np.asarray(truth.temperature_k - 293.15)
 
-    def where(fitted_share: float, other_share: float) -> Solved:
+    def where(fitted_share: float, other_share: float) -> Analysis:
         rooms = (fitted_share * true_k, other_share * true_k)
-        return eqx.tree_at(lambda s: (s.best.seen.excess_k, s.other.excess_k), fitted, rooms)
+        return eqx.tree_at(lambda s: (s.best.fields.excess_k, s.other.excess_k), fitted, rooms)
 
-    assert promising_closure(where(1.0, 0.0), begun.coarse) is None
-    assert promising_closure(where(0.9, 1.0), begun.coarse) == wanted
+    assert promising_closure(where(1.0, 0.0), background.coarse) is None
+    assert promising_closure(where(0.9, 1.0), background.coarse) == wanted
     # A room that leaves half of the images is doubted whatever the coarse one says.
-    assert promising_closure(where(0.5, 0.0), begun.coarse) == wanted
+    assert promising_closure(where(0.5, 0.0), background.coarse) == wanted
 
 
 @pytest.mark.parametrize("low_m", [1.2, 1.0, None])
@@ -202,10 +218,10 @@ def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothi
     entered = replace(there, boundary=openings)
     problem = measured(entered, solve_room(Problem(there, ()), SETTINGS), 1e-5)
     problem = Problem(problem.scene, problem.shifts)
-    told: list[dict] = []
-    found = solve_room(problem, SETTINGS, on_event=told.append)
+    reported: list[dict] = []
+    found = solve_room(problem, SETTINGS, on_event=reported.append)
 
-    asked_k = [event["suspected_k"] for event in told if "suspected_k" in event]
+    asked_k = [event["suspected_k"] for event in reported if "suspected_k" in event]
     said = [note for note in found.notes if "heat that is not in the scene" in note]
     assert len(asked_k) == len(said) == len(heaters)
     if low_m is not None:
@@ -218,31 +234,36 @@ def test_what_a_stated_heater_gives_off_is_found_by_marches(truth: Solution, dev
     supply = replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))
     panel = Heater(patch=Patch(wall="z_min", lower_m=(1.0, 0.6), upper_m=(1.6, 1.4)), temperature_k=333.15)
     stated = replace(scene(supply), boundary=(*scene(supply).boundary, panel))
-    begun = begin(Problem(stated, ()), SETTINGS, lambda _: None)
-    own = begun.prior.names().index("heater_log_heat[0]")
-    vector = np.zeros(len(begun.prior.active()))
+    background = background_of(Problem(stated, ()), SETTINGS, lambda _: None)
+    own = background.prior.names().index("heater_log_heat[0]")
+    vector = np.zeros(len(background.prior.active()))
     vector[own] = deviations
     vertices = (SETTINGS.vertices,) * 3
-    there = attempt(
-        begun.coarse, begun.prior.parameters(vector), begun.base.flow.last, 60.0, vertices, lambda _: None
+    there = march_under(
+        background.coarse,
+        background.prior.parameters(vector),
+        background.base.flow.last,
+        60.0,
+        vertices,
+        lambda _: None,
     )
-    warmed = eqx.tree_at(lambda s: s.temperature_k, truth, there.seen.excess_k + 293.15)
+    warmed = eqx.tree_at(lambda s: s.temperature_k, truth, there.fields.excess_k + 293.15)
     data = observations(Problem(stated, measured(stated, warmed, 1e-5).shifts), vertices)
     nothing = np.zeros(len(data.values()[0]))
 
     found, room = heaters_by_march(
-        begun.coarse, begun.prior, data, begun.base, nothing, SETTINGS, lambda _: None
+        background.coarse, background.prior, data, background.base, nothing, SETTINGS, lambda _: None
     )
 
     np.testing.assert_allclose(found, vector)
-    assert (misfit_ratio(data, room, begun.base) < 0.5) == (deviations != 0.0)
+    assert (misfit_ratio(data, room, background.base) < 0.5) == (deviations != 0.0)
 
 
 def test_a_level_that_thermometers_moved_is_doubted_by_half_of_that(truth: Solution):
     problem = measured(scene(SUPPLY), truth, 1e-5)
-    fitted = fitted_room(begin(problem, SETTINGS, lambda _: None), problem, SETTINGS, lambda _: None)
+    fitted = fitted_room(background_of(problem, SETTINGS, lambda _: None), problem, SETTINGS, lambda _: None)
     # As if parameters alone had made a room 2 K colder than the plane says.
-    colder = eqx.tree_at(lambda s: s.before.seen.excess_k, fitted, fitted.before.seen.excess_k - 2.0)
+    colder = eqx.tree_at(lambda s: s.before.fields.excess_k, fitted, fitted.before.fields.excess_k - 2.0)
     own, doubted = (solution(s, 0.0, use_images=True) for s in (fitted, colder))
 
     inside = (slice(1, -1),) * 3

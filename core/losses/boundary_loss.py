@@ -10,12 +10,11 @@ from jaxtyping import Float
 
 from core.geometry import WallName
 from core.grid.interpolation import interpolation_matrix
-from core.losses.boussinesq import Flow
-from core.losses.physics import BoundaryLoss, MeanLoss, Patch, PointLoss
+from core.losses.boussinesq import FlowValues
+from core.losses.physics import BoundaryLoss, KnownValues, MeanLoss, PointLoss
 from core.losses.representation import Span, Spans, points_of, positions
 from core.problem import PlaneData, Problem, SensorData
-from core.scene import Heater, Inlet, Outlet, Wall
-from core.scene import Patch as WallPatch
+from core.scene import Heater, Inlet, Outlet, Patch, Wall
 from core.setting import SettingError
 from core.solve.nondimensional import Frame, measured_outlets
 
@@ -55,7 +54,7 @@ def point_losses(problem: Problem, frame: Frame) -> tuple[PointLoss, ...]:
         centre = jnp.asarray(
             [[(a + b) / 2 for a, b in zip(frame.lower, frame.upper, strict=True)]], jnp.float32
         )
-        weight = Flow(jnp.zeros(1), jnp.full(1, 0.01), jnp.zeros((1, 3)))
+        weight = FlowValues(jnp.zeros(1), jnp.full(1, 0.01), jnp.zeros((1, 3)))
         losses.append(PointLoss(centre, _zeros((1,)), weight, name="gauge"))
     return tuple(losses)
 
@@ -87,7 +86,7 @@ def _inwards(spans: Spans, wall: WallName, frame: Frame, n: int) -> Spans:
     return _triple(moved)
 
 
-def _plane(plane: PlaneData, frame: Frame, n: int) -> Patch:
+def _plane(plane: PlaneData, frame: Frame, n: int) -> KnownValues:
     spans, axes = _wall_spans(plane.wall, frame, n)
     room, (first, second) = frame.room, axes
     shape = tuple(span[2] for span in spans)
@@ -108,7 +107,7 @@ def _plane(plane: PlaneData, frame: Frame, n: int) -> Patch:
     largest = [
         max(float(jnp.abs(v).max()), 0.1) for v in (target.temperature, target.pressure, target.velocity)
     ]
-    return Patch(spans, target, _constant(shape, 1 / largest[0], 1 / largest[1], 1 / largest[2]))
+    return KnownValues(spans, target, _constant(shape, 1 / largest[0], 1 / largest[1], 1 / largest[2]))
 
 
 def _resolves_layers(problem: Problem) -> bool:
@@ -120,7 +119,7 @@ def _resolves_layers(problem: Problem) -> bool:
     return problem.scene.flow.transport in ("molecular", "given")
 
 
-def _wall(wall: Wall, held: list[WallPatch], frame: Frame, n: int, *, resolved: bool) -> list[Patch]:
+def _wall(wall: Wall, held: list[Patch], frame: Frame, n: int, *, resolved: bool) -> list[KnownValues]:
     spans, axes = _wall_spans(wall.wall, frame, n)
     shape = tuple(span[2] for span in spans)
     free = ~np.any([_inside(h, spans, axes, frame) for h in held], axis=0) if held else np.ones(shape, bool)
@@ -132,13 +131,13 @@ def _wall(wall: Wall, held: list[WallPatch], frame: Frame, n: int, *, resolved: 
         pressure=0.0,
         velocity=float(wall.no_slip),
     )
-    patches = [Patch(spans, target, weight)]
+    patches = [KnownValues(spans, target, weight)]
     if wall.thermal == "adiabatic":
         patches.append(_insulated(wall.wall, spans, free, frame, n))
     return patches
 
 
-def _insulated(wall: WallName, spans: Spans, free: np.ndarray, frame: Frame, n: int) -> Patch:
+def _insulated(wall: WallName, spans: Spans, free: np.ndarray, frame: Frame, n: int) -> KnownValues:
     """No heat through the wall: the temperatures half a spacing inside and outside are equal."""
     axis = "xyz".index(wall[0])
     step = (frame.upper[axis] - frame.lower[axis]) / (n - 1)  # half a cell on either side: see `solve_grid`
@@ -146,10 +145,10 @@ def _insulated(wall: WallName, spans: Spans, free: np.ndarray, frame: Frame, n: 
     before, after = list(spans), list(spans)
     before[axis], after[axis] = (place - step, place - step, 1), (place + step, place + step, 1)
     weight = _masked(free, temperature=1.0, pressure=0.0, velocity=0.0)
-    return Patch(_triple(after), _zeros(free.shape), weight, minus=_triple(before))
+    return KnownValues(_triple(after), _zeros(free.shape), weight, minus=_triple(before))
 
 
-def _patch(item: Inlet | Outlet | Heater, frame: Frame, n: int) -> Patch:
+def _patch(item: Inlet | Outlet | Heater, frame: Frame, n: int) -> KnownValues:
     spans, axes = _wall_spans(item.patch.wall, frame, n)
     shape = tuple(span[2] for span in spans)
     inside = _inside(item.patch, spans, axes, frame)
@@ -166,7 +165,7 @@ def _patch(item: Inlet | Outlet | Heater, frame: Frame, n: int) -> Patch:
             # The patch's mean temperature is a row of its own: it is not each point's.
             target = _values(shape, frame, frame.scales.reference_k)
             weight = _masked(inside, temperature=0.0, pressure=1.0, velocity=0.0)
-    return Patch(spans, target, weight)
+    return KnownValues(spans, target, weight)
 
 
 def _nothing_inside(item: Inlet | Outlet | Heater, n: int) -> SettingError:
@@ -188,7 +187,7 @@ def _sensors(sensor: SensorData, frame: Frame) -> PointLoss:
     t_weight = np.where(t_known, _READING * abs(frame.scales.excess_k) / sensor.temperature_std_k, 0.0)
     u_std = np.where(np.isfinite(sensor.velocity_std_m_s), sensor.velocity_std_m_s, 1.0)[:, None]
     u_weight = np.where(u_known, _READING * frame.scales.velocity_m_s / u_std, 0.0)
-    weight = Flow(
+    weight = FlowValues(
         jnp.asarray(np.nan_to_num(t_weight), jnp.float32),
         jnp.zeros(len(points)),
         jnp.asarray(u_weight, jnp.float32),
@@ -211,7 +210,7 @@ def _triple(spans: list[Span]) -> Spans:
     return x, y, z
 
 
-def _inside(patch: WallPatch, spans: Spans, axes: tuple[int, int], frame: Frame) -> np.ndarray:
+def _inside(patch: Patch, spans: Spans, axes: tuple[int, int], frame: Frame) -> np.ndarray:
     inside = np.ones(tuple(span[2] for span in spans), bool)
     for axis, low, high in zip(axes, patch.lower_m, patch.upper_m, strict=True):
         metres = frame.room.lower_m[axis] + frame.scales.length_m * positions(spans[axis])
@@ -222,7 +221,7 @@ def _inside(patch: WallPatch, spans: Spans, axes: tuple[int, int], frame: Frame)
 
 def _values(
     shape: tuple[int, ...], frame: Frame, temperature_k: float, velocity_m_s: tuple = (0.0, 0.0, 0.0)
-) -> Flow:
+) -> FlowValues:
     flow = frame.scales.to_nd(
         jnp.full(shape, temperature_k, jnp.float32),
         jnp.zeros(shape),
@@ -231,16 +230,16 @@ def _values(
     return flow
 
 
-def _masked(mask: np.ndarray, *, temperature: float, pressure: float, velocity: float) -> Flow:
+def _masked(mask: np.ndarray, *, temperature: float, pressure: float, velocity: float) -> FlowValues:
     on = jnp.asarray(mask, jnp.float32)
-    return Flow(
+    return FlowValues(
         temperature * on, pressure * on, jnp.broadcast_to((velocity * on)[..., None], (*mask.shape, 3))
     )
 
 
-def _constant(shape: tuple[int, ...], temperature: float, pressure: float, velocity: float) -> Flow:
+def _constant(shape: tuple[int, ...], temperature: float, pressure: float, velocity: float) -> FlowValues:
     return _masked(np.ones(shape, bool), temperature=temperature, pressure=pressure, velocity=velocity)
 
 
-def _zeros(shape: tuple[int, ...]) -> Flow:
-    return Flow(jnp.zeros(shape), jnp.zeros(shape), jnp.zeros((*shape, 3)))
+def _zeros(shape: tuple[int, ...]) -> FlowValues:
+    return FlowValues(jnp.zeros(shape), jnp.zeros(shape), jnp.zeros((*shape, 3)))

@@ -12,9 +12,11 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.room.boundary import Boundary, set_normal
 from core.room.closure import AbstractClosure
-from core.room.grid import (
+from core.room.k_epsilon import KEpsilonState
+from core.room.momentum import Viscosity, momentum_rate
+from core.room.pressure import PressureSolver, pressure_solver, project
+from core.room.room_grid import (
     AXES,
     Cells,
     RoomGrid,
@@ -25,10 +27,8 @@ from core.room.grid import (
     last_plane,
     with_walls,
 )
-from core.room.k_epsilon import KEpsilonState
-from core.room.momentum import Viscosity, momentum_rate
-from core.room.pressure import PressureSolver, pressure_solver, project
 from core.room.transport import add_to_walls, scalar_rate, wall_heat_rate
+from core.room.wall_planes import Boundary, set_normal
 
 
 class Flow(eqx.Module):

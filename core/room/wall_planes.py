@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.room.grid import AXES, RoomGrid, Velocity, first_plane, last_plane, stored
+from core.room.room_grid import AXES, RoomGrid, Velocity, first_plane, last_plane, stored
 
 Plane = Float[Array, "first second"]
 
@@ -18,7 +18,7 @@ class WallPlane(eqx.Module):
     """One wall. Velocities point along the axes; temperatures are in excess of the ambient one.
 
     `conductance_m_s` is the kinematic heat coefficient q / (rho c dT) over the face, `wall_excess_k` the
-    conductance-weighted mean temperature behind it; `grip` is 1 for no-slip and 0 for a free surface;
+    conductance-weighted mean temperature behind it; `no_slip` is 1 for no-slip and 0 for a free surface;
     `held` is the share of the face whose own temperature is known, and shown on its vertices;
     `turbulent_energy_m2_s2` and `dissipation_m2_s3` are those of inflowing air.
     """
@@ -31,7 +31,7 @@ class WallPlane(eqx.Module):
     wall_excess_k: Plane
     turbulent_energy_m2_s2: Plane
     dissipation_m2_s3: Plane
-    grip: Float[Array, ""]
+    no_slip: Float[Array, ""]
     held: Plane
 
 
@@ -41,15 +41,15 @@ class Boundary(eqx.Module):
     walls: tuple[tuple[WallPlane, WallPlane], tuple[WallPlane, WallPlane], tuple[WallPlane, WallPlane]]
 
 
-def closed_wall(grid: RoomGrid, axis: int, grip: float = 1.0) -> WallPlane:
+def closed_wall(grid: RoomGrid, axis: int, no_slip: float = 1.0) -> WallPlane:
     """A wall at rest that no heat passes."""
     zero = jnp.zeros(grid.plane(axis), jnp.float32)
-    return WallPlane(zero, (zero, zero), zero, zero, zero, zero, zero, zero, jnp.float32(grip), zero + 1.0)
+    return WallPlane(zero, (zero, zero), zero, zero, zero, zero, zero, zero, jnp.float32(no_slip), zero + 1.0)
 
 
-def closed_room(grid: RoomGrid, grip: float = 1.0) -> Boundary:
+def closed_room(grid: RoomGrid, no_slip: float = 1.0) -> Boundary:
     """Six closed adiabatic walls: the start of every setup."""
-    x, y, z = ((closed_wall(grid, a, grip), closed_wall(grid, a, grip)) for a in AXES)
+    x, y, z = ((closed_wall(grid, a, no_slip), closed_wall(grid, a, no_slip)) for a in AXES)
     return Boundary((x, y, z))
 
 
