@@ -15,24 +15,23 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import TypeAdapter
 
-from app.api.resources.about import About, Health
-from app.api.resources.calibrations import CalibrationResource
-from app.api.resources.captures import CaptureResource, DeskResource, Role
-from app.api.resources.devices import CameraResource
-from app.api.resources.events import EventResource
-from app.api.resources.experiments import ExperimentLine, ExperimentResource
-from app.api.resources.guide import GuideResource, StepText
-from app.api.resources.jobs import Curves, JobResource
-from app.api.resources.projector import ProjectorResource, WireLine
-from app.api.resources.results import ComparisonResource, PresetResource, ResultLine, ResultResource
-from app.api.resources.screen import ScreenResource
-from app.api.resources.shift import ShiftResource
-from app.api.resources.uploads import Upload
-from app.api.wire.problems import MEDIA_TYPE, Problem
+from app.api.models.about import About, Health
+from app.api.models.calibrations import CalibrationResource
+from app.api.models.captures import CaptureResource, DeskResource, Role
+from app.api.models.devices import CameraResource
+from app.api.models.events import EventResource
+from app.api.models.experiments import ExperimentLine, ExperimentResource
+from app.api.models.guide import GuideResource, StepText
+from app.api.models.jobs import Curves, JobResource
+from app.api.models.problem import MEDIA_TYPE, Problem
+from app.api.models.projector import ProjectorResource, WireLine
+from app.api.models.results import ComparisonResource, PresetResource, ResultLine, ResultResource
+from app.api.models.screen import PatternName, ScreenResource
+from app.api.models.shift import ShiftResource
+from app.api.models.uploads import Upload
 from app.errors import AirlensError, BadInputError
 from app.experiment.plan import Plan
 from app.files.durable import write_durably
-from app.rig.patterns import PatternName
 
 T = TypeVar("T")
 ENDED = ("done", "failed", "cancelled")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from app.api import create_app
+from app.api.factory import create_app
 from app.api.security.settings import LOOPBACK, service_config
 from app.api.security.token import service_token
 from app.api.server import Tls, listen, server_of

@@ -1,9 +1,12 @@
 """The plan of an experiment as it is kept, shown and sent: numbers and sentences, no computation."""
 
 import json
+from typing import TYPE_CHECKING
 
-from app.experiment.folder import Experiment
 from app.files.toml import Strict, parse
+
+if TYPE_CHECKING:
+    from app.experiment.folder import Experiment
 
 PLAN_FILE = "plan.json"
 
@@ -86,7 +89,7 @@ class Plan(Strict):
     verdicts: list[str]
 
 
-def read_plan(experiment: Experiment) -> Plan | None:
+def read_plan(experiment: "Experiment") -> Plan | None:
     """The plan that was kept, or None. Raises BadInputError for a file that is none."""
     path = experiment.folder / PLAN_FILE
     if not path.is_file():

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from fastapi import FastAPI
 
-from app.api import create_app
+from app.api.factory import create_app
 from app.api.security.settings import new_token, service_config
 from app.commands.remote import requests
 

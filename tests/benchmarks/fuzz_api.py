@@ -26,8 +26,8 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from app.api import Limits, create_app
-from app.api.security.settings import new_token, service_config
+from app.api.factory import create_app
+from app.api.security.settings import Limits, new_token, service_config
 from app.api.server import listen, serving
 
 CHECKS = [

@@ -36,7 +36,7 @@ import sys
 import time
 from pathlib import Path
 import numpy as np
-from app.api import create_app
+from app.api.factory import create_app
 from app.api.server import listen, server_of
 from app.api.security.settings import service_config
 from drivers.simulated import SimulatedCamera

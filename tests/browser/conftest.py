@@ -11,8 +11,8 @@ import pytest
 from fastapi import FastAPI
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
-from app.api import ServiceConfig, create_app
-from app.api.security.settings import new_token, service_config
+from app.api.factory import create_app
+from app.api.security.settings import ServiceConfig, new_token, service_config
 from app.api.server import listen, serving
 from app.jobs import JobsConfig, Supervisor
 

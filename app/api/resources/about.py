@@ -4,35 +4,14 @@ import importlib.metadata
 import os
 import platform
 import shutil
-from typing import Literal
 
 import psutil
 from fastapi import APIRouter
 
+from app.api.models.about import About, Health
 from app.api.services import Given
-from app.api.wire.strict import Strict
 
 router = APIRouter(tags=["about"])
-
-
-class Health(Strict):
-    """The service answers; the rest are the margins that an operator watches."""
-
-    status: Literal["ok", "disk_low"]
-    free_disk_bytes: int
-    free_memory_bytes: int
-    load_per_core: float
-
-
-class About(Strict):
-    """Versions and the machine."""
-
-    name: Literal["airlens"]
-    version: str
-    python: str
-    machine: str
-    cores: int
-    data_root: str
 
 
 def version() -> str:

@@ -1,16 +1,15 @@
 """Calibrations: what is known of camera, projector and wall, how well, and what to do about it."""
 
-from typing import Literal
-
 import numpy as np
 from fastapi import APIRouter
 from jaxtyping import Float
 
+from app.api.models.calibrations import CalibrationItem, CalibrationResource, NewCalibration, StandingResource
 from app.api.services import Given
+from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
-from app.api.wire.strict import Identifier, Strict
 from app.calibrate.guide import StepName
-from app.calibrate.parts import Part, PartState, bundle_of, is_calibrated, parts_of
+from app.calibrate.parts import Part, bundle_of, is_calibrated, parts_of
 from app.experiment.folder import Experiment
 from app.simulate.rehearsal import calibrate_simulated
 from calibration.bundle import Bundle, CalibratedOptics
@@ -25,43 +24,6 @@ _WITHOUT = {
     StepName.wall: ("back wall", "The rig stands in a frame of its own, not yet in the room."),
     StepName.response: ("response", "The noise written in experiment.toml is used."),
 }
-
-
-class CalibrationItem(Strict):
-    """One thing to calibrate, in words for the operator: measured from images, given, or missing."""
-
-    name: str
-    state: PartState
-    value: str
-    advice: str
-
-
-class StandingResource(Strict):
-    """Where a camera or a projector stands, and where the corners of its picture meet the back wall [m]."""
-
-    name: str
-    role: Literal["camera", "projector"]
-    position_m: list[float]
-    corners_m: list[list[float]]
-
-
-class CalibrationResource(Strict):
-    """The calibration of an experiment; `room_m` are the room's lower and upper corner.
-
-    Incomplete while a part that the rig needs is missing: camera, wall, and the projector where it is the light.
-    """
-
-    state: Literal["calibrated", "incomplete"]
-    date: str | None
-    items: list[CalibrationItem]
-    room_m: list[list[float]]
-    rig: list[StandingResource]
-
-
-class NewCalibration(Strict):
-    """A simulated rig takes its models from its scene; a real one is calibrated on the command line."""
-
-    kind: Literal["simulated"]
 
 
 @router.get("/experiments/{experiment}/calibration")

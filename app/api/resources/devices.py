@@ -7,13 +7,12 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response, WebSocket, WebSocketDisconnect
 from fastapi.responses import StreamingResponse
-from pydantic import Field
 
+from app.api.models.devices import Asked, CameraChange, CameraResource, OpenCamera
 from app.api.resources.projector import ProjectorResource, projector_resource
 from app.api.services import Given, services_of
 from app.api.wire.bodies import body
 from app.api.wire.problems import ApiError
-from app.api.wire.strict import Strict
 from app.api.wire.viewer import Viewer
 from app.rig.frame_statistics import LiveFrame
 from app.rig.live_camera import CameraState
@@ -25,43 +24,6 @@ JPEG_BODY = body("image/jpeg", "What the camera sees now.")
 MJPEG_BODY = body("multipart/x-mixed-replace", "JPEG after JPEG, without end.")
 FRAME_LIMIT_S = 3.0
 Stretch = Annotated[Literal["0", "1"], Query(description="1 stretches the contrast, for the eyes only.")]
-
-
-class CameraResource(Strict):
-    """The camera; numbers are null until it is open."""
-
-    device: Literal["camera"] = "camera"
-    state: Literal["closed", "opening", "ready", "capturing", "failed"]
-    experiment: str | None
-    name: str | None
-    width_px: int | None
-    height_px: int | None
-    bits: int | None
-    frame_rate_hz: float | None
-    exposure_s: float | None
-    gain: float | None
-    reason: str
-
-
-class OpenCamera(Strict):
-    """Which rig to connect; `air` is what a simulated room does."""
-
-    experiment: str
-    air: Literal["still", "moving"] = "still"
-
-
-class CameraChange(Strict):
-    """What to set; what is left out stays."""
-
-    exposure_s: float | None = Field(default=None, gt=0, le=60)
-    gain: float | None = Field(default=None, ge=0, le=1000)
-
-
-class Asked(Strict):
-    """What a viewer sends: how many frames it can take now, and how it wants them."""
-
-    credits: int = Field(default=1, ge=0, le=8)
-    stretch: bool = False
 
 
 @router.get("/devices")

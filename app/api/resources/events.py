@@ -4,14 +4,14 @@ import asyncio
 import json
 import time
 from collections.abc import AsyncIterator
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Header, Query
 from fastapi.responses import StreamingResponse
 
+from app.api.models.events import EventResource
 from app.api.services import Given, Services
 from app.api.wire.bodies import body
-from app.api.wire.strict import Strict
 from app.jobs import Event
 
 router = APIRouter(tags=["events"])
@@ -19,17 +19,6 @@ STREAM = "text/event-stream"
 BODY = body(STREAM, "Server-sent events; `data` is an EventResource.", text=True)
 COMMENT_S = 15.0
 Row = Annotated[int | None, Query(ge=0, le=1 << 62)]
-
-
-class EventResource(Strict):
-    """Something that happened; `id` only grows."""
-
-    id: int
-    job: str | None
-    attempt: int
-    at_s: float
-    kind: str
-    body: dict[str, Any]
 
 
 @router.get("/events/list")

@@ -1,14 +1,13 @@
 """Experiments: one folder each; the rig, the scene, and counts of what was taken and computed."""
 
 from datetime import UTC, datetime
-from typing import Any, Literal
 
 from fastapi import APIRouter
-from pydantic import Field
 
+from app.api.models.experiments import ExperimentChange, ExperimentLine, ExperimentResource, NewExperiment
 from app.api.services import Given
-from app.api.wire.board import BoardGeometry
-from app.api.wire.strict import Identifier, Strict
+from app.api.wire.board import board_settings
+from app.api.wire.identifier import Identifier
 from app.calibrate.parts import is_calibrated, parts_of
 from app.experiment.folder import Experiment, finished, save_settings
 from app.experiment.plan import PLAN_FILE
@@ -17,47 +16,6 @@ from app.simulate.rehearsal import Rehearsal, rehearse
 from core.scene import ProjectedPattern
 
 router = APIRouter(tags=["experiments"])
-
-
-class ExperimentLine(Strict):
-    """One line of the list of experiments; `uncalibrated` names the parts of the rig that need it still."""
-
-    experiment: str
-    title: str
-    information: str
-    camera: str
-    projector: bool
-    light: Literal["texture", "projector"]
-    calibrated: bool
-    uncalibrated: list[str]
-    planned: bool
-    captures: int
-    results: int
-    changed: str
-
-
-class ExperimentResource(ExperimentLine):
-    """One experiment with its rig and scene as they stand in experiment.toml."""
-
-    settings: dict[str, Any]
-
-
-class NewExperiment(Strict):
-    """A simulated rig before the packaged room; real rigs are described in experiment.toml."""
-
-    kind: Literal["simulated"]
-    title: str = Field(default="Simulated room", min_length=1, max_length=200)
-    camera_px: int = Field(default=384, ge=64, le=4096)
-    light: Literal["texture", "projector"] = "texture"
-    boundary: Literal["paper", "operator", "surveyed"] = "surveyed"
-
-
-class ExperimentChange(Strict):
-    """What people wrote about it, and the board that its rig is calibrated with."""
-
-    title: str | None = Field(default=None, max_length=200)
-    information: str | None = Field(default=None, max_length=10_000)
-    board: BoardGeometry | None = None
 
 
 @router.get("/experiments")
@@ -86,7 +44,7 @@ def change_experiment(given: Given, experiment: Identifier, change: ExperimentCh
     found = given.folders.open(experiment)
     words = change.model_dump(exclude_none=True, exclude={"board"})
     if change.board is not None:
-        words["rig"] = found.settings.rig.model_copy(update={"board": change.board.settings()})
+        words["rig"] = found.settings.rig.model_copy(update={"board": board_settings(change.board)})
     return _resource(save_settings(found.folder, found.settings.model_copy(update=words)))
 
 

@@ -1,13 +1,13 @@
 """The guided calibration of an experiment's rig: what to show, take it, retake it, how good it is."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Query
-from pydantic import Field
 
+from app.api.models.guide import GuideRequest, GuideResource, GuideView, StepText, WantedResource
 from app.api.services import Given, Services
-from app.api.wire.board import BoardGeometry
-from app.api.wire.strict import Identifier, Strict
+from app.api.wire.board import board_settings
+from app.api.wire.identifier import Identifier
 from app.calibrate.folder import CalibrationFolder
 from app.calibrate.guide import LivePlan, StepName
 from app.calibrate.service import GuideState
@@ -20,74 +20,7 @@ from calibration.board import Board
 from calibration.record import Placement
 
 router = APIRouter(tags=["calibrations"])
-StepText = Literal["camera", "projector", "wall", "response"]
 StepQuery = Annotated[StepText, Query(description="Which step of the calibration.")]
-
-
-class WantedResource(Strict):
-    """What to arrange next, in words; a board's place as parts of the picture, and which edge is nearer."""
-
-    kind: Literal["board", "place", "wall", "level", "dark", "light"]
-    text: str
-    column: float | None
-    row: float | None
-    span: float | None
-    nearer: Literal["", "left", "right", "upper", "lower"]
-    tilt_deg: float
-    roll_deg: float
-
-
-class GuideView(Strict):
-    """One view of the board; retake it by its name."""
-
-    name: str
-    points: int
-    rms_px: float | None
-    issues: list[str]
-
-
-class GuideResource(Strict):
-    """A guided calibration. While `state` is running, `done` of `total` pictures of `wanted` are taken.
-
-    `busy` is true also while another step, or another experiment's, takes pictures: none can be begun.
-    `coverage` holds rows of cells from the picture's top left; `residuals_px` holds column, row, and the
-    residual there, in pixels of a picture of `width_px` x `height_px`.
-    """
-
-    state: Literal["idle", "running", "failed"]
-    busy: bool
-    step: StepText
-    reason: str
-    wanted: WantedResource | None
-    done: int
-    total: int
-    issues: list[str]
-    complete: bool
-    views: list[GuideView]
-    width_px: int | None
-    height_px: int | None
-    coverage: list[list[bool]]
-    covered: float
-    rms_px: float | None
-    residuals_px: list[tuple[float, float, float, float]]
-    advice: list[str]
-
-
-class GuideRequest(Strict):
-    """Which step, and how; without a board, the experiment's own is used (rehearsals have one).
-
-    `anchor` is a wall point seen at u, v whose world x, z [m] were measured.
-    """
-
-    step: StepText
-    board: BoardGeometry | None = None
-    frames: int = Field(default=1, ge=1, le=1000)
-    response_frames: int = Field(default=16, ge=2, le=1000)
-    settle_s: float = Field(default=0.2, ge=0, le=60)
-    anchor: tuple[float, float, float, float] | None = None
-    plumb_px: tuple[float, float, float, float] | None = None
-    ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
-    minutes_on: float | None = Field(default=None, ge=0, le=1e6)
 
 
 @router.get("/experiments/{experiment}/calibration/guide")
@@ -156,7 +89,7 @@ def _plan(experiment: Experiment, request: GuideRequest) -> LivePlan:
 def _board(experiment: Experiment, request: GuideRequest) -> Board | None:
     """The board of the request, else of the experiment."""
     if request.board is not None:
-        return request.board.settings().board()
+        return board_settings(request.board).board()
     own = experiment.settings.rig.board
     return None if own is None else own.board()
 

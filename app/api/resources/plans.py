@@ -3,8 +3,8 @@
 from fastapi import APIRouter
 
 from app.api.services import Given
+from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
-from app.api.wire.strict import Identifier
 from app.experiment.plan import Plan
 from app.experiment.plan import read_plan as kept_plan
 

@@ -1,61 +1,19 @@
 """The rig's projector: what it says of itself, what it may be told, and every byte of it."""
 
 import time
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Query
-from pydantic import Field
 
+from app.api.models.projector import OpenProjector, ProjectorChange, ProjectorResource, WireLine
 from app.api.services import Given
 from app.api.wire.problems import ApiError
-from app.api.wire.strict import Strict
 from app.rig.live_projector import ProjectorReport
 from app.rig.open import open_projector
 from drivers.errors import DeviceRefusedError
 from drivers.projector.protocol import Projector
 
 router = APIRouter(tags=["devices"])
-
-
-class ProjectorResource(Strict):
-    """The projector; what it does not know is null. `for_s` is how long it has been in this state."""
-
-    device: Literal["projector"] = "projector"
-    state: Literal["closed", "standby", "warming", "on", "cooling", "fault", "silent", "lost"]
-    experiment: str | None
-    name: str | None
-    source: str | None
-    muted: bool | None
-    frozen: bool | None
-    lamp_hours: int | None
-    lamp_on_s: float | None
-    for_s: float | None
-    errors: list[str]
-    capabilities: list[str]
-    reason: str
-
-
-class OpenProjector(Strict):
-    """Which rig's projector to speak to."""
-
-    experiment: str
-
-
-class ProjectorChange(Strict):
-    """What to tell it; what is left out stays. Power takes minutes: `state` says how far it is."""
-
-    power: Literal["on", "off"] | None = None
-    source: str | None = Field(default=None, min_length=1, max_length=16, pattern="^[A-Za-z0-9]+$")
-    muted: bool | None = None
-    frozen: bool | None = None
-
-
-class WireLine(Strict):
-    """One piece of traffic: > sent, < received, ! a remark; control bytes are spelled out."""
-
-    at_s: float
-    direction: str
-    text: str
 
 
 @router.get("/devices/projector")

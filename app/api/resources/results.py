@@ -2,21 +2,29 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 
+from app.api.models.results import (
+    ComparisonResource,
+    FieldResource,
+    Form,
+    PresetResource,
+    ReadingResource,
+    ResultLine,
+    ResultResource,
+    ScoreResource,
+)
 from app.api.security.headers import REPORT_POLICY
 from app.api.services import Given, Services
 from app.api.wire.bodies import body
+from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
-from app.api.wire.strict import Identifier, Strict
-from app.api.wire.volumes import Axis, Encoding, Kind, Packed, Shown, Volume, cut, pack
+from app.api.wire.volumes import Axis, Encoding, Packed, Shown, Volume, cut, pack
 from app.experiment.folder import read_manifest
-
-Form = Literal["nc", "h5", "vti", "csv", "zip", "png"]
 
 router = APIRouter(tags=["results"])
 NUMBERS = body(
@@ -25,78 +33,6 @@ NUMBERS = body(
 FILE = body("application/octet-stream", "A file to keep.")
 PAGE = body("text/html", "A page in one file.", text=True)
 Code = Annotated[Encoding, Query(description="u16: scaled; f16: about the middle; f32: as it is.")]
-
-
-class PresetResource(Strict):
-    """A named way to solve."""
-
-    preset: str
-    about: str
-
-
-class ResultLine(Strict):
-    """One line of the list of results. `interrupted` ones have no manifest and are never used."""
-
-    result: str
-    state: str
-    created: str | None
-    preset: str | None
-    outcome: str | None
-
-
-class FieldResource(Strict):
-    """One scalar on the result's vertices; `low` and `high` leave out a hundredth on each side."""
-
-    name: str
-    unit: str
-    label: str
-    kind: Kind
-    minimum: float
-    maximum: float
-    low: float
-    high: float
-    mean: float
-
-
-class ResultResource(Strict):
-    """A result: its grid, its fields, how it ended, and the manifest that says where it came from."""
-
-    result: str
-    x_m: list[float]
-    y_m: list[float]
-    z_m: list[float]
-    fields: list[FieldResource]
-    outcome: str
-    advice: str
-    solver_s: float
-    notes: list[str]
-    manifest: dict[str, Any]
-
-
-class ScoreResource(Strict):
-    """One figure against the truth, in words."""
-
-    name: str
-    value: float
-    unit: str
-
-
-class ReadingResource(Strict):
-    """One quantity at one point sensor: measured, with its standard deviation, and found there."""
-
-    name: str
-    unit: str
-    position_m: list[float]
-    measured: float
-    std: float
-    found: float
-
-
-class ComparisonResource(Strict):
-    """A result against what is known better; empty lists where nothing is."""
-
-    scores: list[ScoreResource]
-    readings: list[ReadingResource]
 
 
 @router.get("/experiments/{experiment}/results")

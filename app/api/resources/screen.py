@@ -1,41 +1,20 @@
 """What the projector's own page (the kiosk) shows: which pattern, and whether it is there pixel for pixel."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import cv2
 from fastapi import APIRouter, Query, Response
 
+from app.api.models.screen import ScreenResource, ShowPattern, State
 from app.api.services import Given, Services
 from app.api.wire.bodies import body
-from app.api.wire.strict import Identifier, Strict
+from app.api.wire.identifier import Identifier
 from app.kiosk.screen import KioskScreen
 from app.rig.patterns import PatternName, pattern_picture
 from drivers.display import Picture
 
 router = APIRouter(tags=["devices"])
 PICTURE = body("image/png", "The pattern, made smaller for the eyes.")
-
-
-State = Literal["empty", "waiting", "showing", "refused", "away"]
-
-
-class ScreenResource(Strict):
-    """`showing` means that the kiosk page drew the picture and read back the very same pixels."""
-
-    device: Literal["screen"] = "screen"
-    state: State
-    width_px: int | None
-    height_px: int | None
-    digest: str
-    reason: str
-    page: str = "/kiosk/page"
-
-
-class ShowPattern(Strict):
-    """Which pattern of which experiment's projector."""
-
-    experiment: str
-    pattern: PatternName
 
 
 @router.get("/devices/screen")

@@ -5,9 +5,9 @@ from datetime import UTC, datetime
 import numpy as np
 from fastapi import APIRouter
 
+from app.api.models.shift import ShiftResource
 from app.api.services import Given, Services
 from app.api.wire.problems import ApiError
-from app.api.wire.strict import Strict
 from app.experiment.captures import load_capture
 from app.experiment.folder import Experiment, read_manifest
 from app.rig.live_camera import CameraState
@@ -15,17 +15,6 @@ from drivers.protocols import Frame
 from drivers.quick_look import quick_look
 
 router = APIRouter(tags=["devices"])
-
-
-class ShiftResource(Strict):
-    """Shifts in camera pixels, (columns, rows), against the newest reference; `drift_px` is the border's."""
-
-    reference: str
-    age_s: float
-    drift_px: list[float]
-    drift_spread_px: float
-    largest_px: float
-    tiles: int
 
 
 @router.get("/devices/camera/shift")

@@ -1,40 +1,16 @@
 """Files that an operator sends: PNG, TIFF, NPY and NPZ, as the raw body of one request."""
 
-from typing import Literal
-
 from fastapi import APIRouter, Request
 
+from app.api.models.uploads import Upload
 from app.api.services import Given
+from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
-from app.api.wire.strict import Identifier, Strict
 from app.errors import BadInputError
 
 router = APIRouter(tags=["uploads"])
 BINARY = {"schema": {"type": "string", "format": "binary"}}
 BODY = {"requestBody": {"required": True, "content": {"application/octet-stream": BINARY}}}
-
-
-class UploadedArray(Strict):
-    """One array of an upload."""
-
-    name: str
-    shape: list[int]
-    dtype: str
-    minimum: float
-    maximum: float
-    mean: float
-    nonfinite: int
-
-
-class Upload(Strict):
-    """A file that was checked, read and kept."""
-
-    upload: str
-    kind: Literal["png", "tiff", "npy", "npz"]
-    bytes: int
-    sha256: str
-    received_s: float
-    arrays: list[UploadedArray]
 
 
 @router.get("/uploads")

@@ -6,12 +6,13 @@ Pure ASGI, outermost: no route, static file or error handler can be reached arou
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.api.models.problem import MEDIA_TYPE
 from app.api.security.access import SAFE_METHODS, Access, Caller
 from app.api.security.audit import AuditLog
 from app.api.security.headers import headers_for
 from app.api.security.rate import RateLimiter
 from app.api.security.settings import Limits
-from app.api.wire.problems import MEDIA_TYPE, ApiError, body_of
+from app.api.wire.problems import ApiError, body_of
 
 PUBLIC_FILES = frozenset({"/", "/index.html", "/favicon.svg"})
 PUBLIC_FOLDER = "/assets/"

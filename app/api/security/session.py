@@ -1,19 +1,11 @@
 """Exchange of the token, once, for a cookie that scripts cannot read."""
 
-from typing import Literal
-
 from fastapi import APIRouter, Response
 
+from app.api.models.session import Session
 from app.api.services import Given
-from app.api.wire.strict import Strict
 
 router = APIRouter(tags=["session"])
-
-
-class Session(Strict):
-    """The browser's session."""
-
-    state: Literal["open", "closed"]
 
 
 @router.post("/session")

@@ -1,25 +1,11 @@
-"""The board that a rig is calibrated with, as it crosses the API."""
+"""The board of a request as experiment.toml keeps it."""
 
-from typing import Literal
-
-from pydantic import Field
-
-from app.api.wire.strict import Strict
+from app.api.models.board import BoardGeometry
 from app.experiment.rig_settings import BoardSettings
 
 
-class BoardGeometry(Strict):
-    """A board: inner corners of a chessboard, squares of a ChArUco board, circles."""
-
-    kind: Literal["chessboard", "charuco", "circles", "asymmetric-circles"] = "chessboard"
-    columns: int = Field(ge=2, le=200)
-    rows: int = Field(ge=2, le=200)
-    square_m: float = Field(gt=0, le=10)
-    marker_m: float | None = Field(default=None, gt=0, le=10)
-    dictionary: str = Field(default="DICT_5X5_250", max_length=40)
-
-    def settings(self) -> BoardSettings:
-        """The same for experiment.toml. Raises BadInputError for a board that cannot be."""
-        found = BoardSettings(**self.model_dump())
-        found.board()
-        return found
+def board_settings(geometry: BoardGeometry) -> BoardSettings:
+    """The same for experiment.toml. Raises BadInputError for a board that cannot be."""
+    found = BoardSettings(**geometry.model_dump())
+    found.board()
+    return found

@@ -5,7 +5,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from app.api.wire.problems import MEDIA_TYPE, Problem
+from app.api.models.problem import MEDIA_TYPE, Problem
 
 PROBLEM = {"$ref": "#/components/schemas/Problem"}
 ERROR = {"description": "What happened, why, and what to do.", "content": {MEDIA_TYPE: {"schema": PROBLEM}}}

@@ -9,8 +9,9 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
+from app.api.models.problem import MEDIA_TYPE, FieldError
 from app.api.security.headers import headers_for
-from app.api.wire.problems import MEDIA_TYPE, ApiError, FieldError, body_of
+from app.api.wire.problems import ApiError, body_of
 from app.errors import AirlensError, BadInputError
 from app.jobs import EngineError, JobError, LedgerError, UnknownJobError
 from calibration.errors import CalibrationError

@@ -4,10 +4,9 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pydantic import BaseModel, ConfigDict
 from starlette.exceptions import HTTPException
 
-MEDIA_TYPE = "application/problem+json"
+from app.api.models.problem import FieldError, Problem
 
 
 @dataclass(frozen=True)
@@ -49,29 +48,6 @@ KINDS: Mapping[str, Kind] = {
     "unavailable": Kind(503, "Not available now", "Try again in a moment."),
     "disk_full": Kind(507, "The disk is full", "Free space on the data disk; nothing half-written was kept."),
 }
-
-
-class FieldError(BaseModel):
-    """One field that was not accepted."""
-
-    model_config = ConfigDict(extra="forbid")
-    field: str
-    message: str
-
-
-class Problem(BaseModel):
-    """RFC 9457 problem details. `detail` is written for the operator and is shown as it is."""
-
-    model_config = ConfigDict(extra="forbid")
-    type: str
-    title: str
-    status: int
-    code: str
-    detail: str
-    cause: str
-    next_step: str
-    instance: str | None = None
-    errors: list[FieldError] = []
 
 
 class ApiError(HTTPException):

@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float32
 
+from app.api.models.results import Kind
 from app.api.wire.problems import ApiError
 from app.volume.file import Beside
 from core.result import Solution
 
 Encoding = Literal["u16", "f16", "f32"]
 Axis = Literal["x", "y", "z"]
-Kind = Literal["found", "uncertainty", "truth", "error"]
 KEPT = 4
 
 

@@ -8,8 +8,8 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from app.api import ServiceConfig, create_app
-from app.api.security.settings import new_token, service_config
+from app.api.factory import create_app
+from app.api.security.settings import ServiceConfig, new_token, service_config
 from app.api.server import listen, serving
 
 

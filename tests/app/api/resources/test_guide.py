@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.api.resources.guide import GuideResource, StepText
+from app.api.models.guide import GuideResource, StepText
 from app.client import Client, ServiceError
 from tests.app.api.conftest import Live
 

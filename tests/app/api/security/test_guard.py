@@ -12,8 +12,8 @@ from fastapi import FastAPI
 from fastapi.routing import APIRoute, APIWebSocketRoute
 from starlette.routing import Route, WebSocketRoute
 
-from app.api import Limits, create_app
-from app.api.security.settings import new_token, service_config
+from app.api.factory import create_app
+from app.api.security.settings import Limits, new_token, service_config
 from app.api.server import listen, serving
 from tests.app.api.conftest import Live, is_problem
 from tests.run_async import run_async

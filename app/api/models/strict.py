@@ -1,11 +1,8 @@
 """The base of everything that crosses the API: strict, closed, unchangeable."""
 
-from typing import Annotated, Self
+from typing import Self
 
-from fastapi import Path
 from pydantic import BaseModel, ConfigDict
-
-ID_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
 
 
 class Strict(BaseModel):
@@ -17,6 +14,3 @@ class Strict(BaseModel):
     def of(cls, status: object) -> Self:
         """Return the resource that shows a status of the application: the same fields by the same names."""
         return cls.model_validate(status, from_attributes=True)
-
-
-Identifier = Annotated[str, Path(pattern=ID_PATTERN, description="An id that the service gave.")]

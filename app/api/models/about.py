@@ -1,0 +1,25 @@
+"""What the service says of itself."""
+
+from typing import Literal
+
+from app.api.models.strict import Strict
+
+
+class Health(Strict):
+    """The service answers; the rest are the margins that an operator watches."""
+
+    status: Literal["ok", "disk_low"]
+    free_disk_bytes: int
+    free_memory_bytes: int
+    load_per_core: float
+
+
+class About(Strict):
+    """Versions and the machine."""
+
+    name: Literal["airlens"]
+    version: str
+    python: str
+    machine: str
+    cores: int
+    data_root: str

@@ -1,0 +1,18 @@
+"""The board that a rig is calibrated with, as it crosses the API."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.api.models.strict import Strict
+
+
+class BoardGeometry(Strict):
+    """A board: inner corners of a chessboard, squares of a ChArUco board, circles."""
+
+    kind: Literal["chessboard", "charuco", "circles", "asymmetric-circles"] = "chessboard"
+    columns: int = Field(ge=2, le=200)
+    rows: int = Field(ge=2, le=200)
+    square_m: float = Field(gt=0, le=10)
+    marker_m: float | None = Field(default=None, gt=0, le=10)
+    dictionary: str = Field(default="DICT_5X5_250", max_length=40)

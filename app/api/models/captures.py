@@ -1,0 +1,79 @@
+"""Captures, and the burst that is being taken."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.api.models.strict import Strict
+
+Role = Literal["reference", "flow", "dark", "flat"]
+
+
+class DeskResource(Strict):
+    """The capture that is being taken, or the last one."""
+
+    state: Literal["idle", "running", "finished", "aborted", "incomplete", "failed"]
+    experiment: str | None
+    capture: str | None
+    role: str | None
+    done: int
+    total: int
+    refused: int
+    level: float
+    reason: str
+
+
+class NewCapture(Strict):
+    """A burst; settings that are left out stay as they are."""
+
+    role: Role
+    frames: int = Field(default=100, ge=1, le=100_000)
+    exposure_s: float | None = Field(default=None, gt=0, le=60)
+    gain: float | None = Field(default=None, ge=0, le=1000)
+    settle_s: float = Field(default=0.0, ge=0, le=600)
+    raw_stack: bool = False
+
+
+class Abort(Strict):
+    """What becomes of the frames that were taken."""
+
+    discard: bool = False
+
+
+class VerdictResource(Strict):
+    """One judgement of a burst: `value` against `expected`, and what to do when it is not good."""
+
+    name: str
+    good: bool
+    value: float
+    expected: str
+    advice: str
+
+
+class SettingResource(Strict):
+    """A setting as asked for and as granted."""
+
+    name: str
+    asked: float | None
+    granted: float
+
+
+class CaptureResource(Strict):
+    """One capture. `interrupted` ones have no manifest and are never used as a measurement."""
+
+    capture: str
+    state: Literal["finished", "incomplete", "interrupted"]
+    role: str | None
+    created: str | None
+    frames: int | None
+    width_px: int | None
+    height_px: int | None
+    verdicts: list[VerdictResource]
+    settings: list[SettingResource]
+    notes: str
+
+
+class CaptureChange(Strict):
+    """What people wrote about it."""
+
+    notes: str = Field(max_length=10_000)

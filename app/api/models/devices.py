@@ -1,0 +1,44 @@
+"""The camera as it stands, and what it may be told."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.api.models.strict import Strict
+
+
+class CameraResource(Strict):
+    """The camera; numbers are null until it is open."""
+
+    device: Literal["camera"] = "camera"
+    state: Literal["closed", "opening", "ready", "capturing", "failed"]
+    experiment: str | None
+    name: str | None
+    width_px: int | None
+    height_px: int | None
+    bits: int | None
+    frame_rate_hz: float | None
+    exposure_s: float | None
+    gain: float | None
+    reason: str
+
+
+class OpenCamera(Strict):
+    """Which rig to connect; `air` is what a simulated room does."""
+
+    experiment: str
+    air: Literal["still", "moving"] = "still"
+
+
+class CameraChange(Strict):
+    """What to set; what is left out stays."""
+
+    exposure_s: float | None = Field(default=None, gt=0, le=60)
+    gain: float | None = Field(default=None, ge=0, le=1000)
+
+
+class Asked(Strict):
+    """What a viewer sends: how many frames it can take now, and how it wants them."""
+
+    credits: int = Field(default=1, ge=0, le=8)
+    stretch: bool = False

@@ -1,0 +1,16 @@
+"""Something that happened."""
+
+from typing import Any
+
+from app.api.models.strict import Strict
+
+
+class EventResource(Strict):
+    """Something that happened; `id` only grows."""
+
+    id: int
+    job: str | None
+    attempt: int
+    at_s: float
+    kind: str
+    body: dict[str, Any]

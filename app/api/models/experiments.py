@@ -1,0 +1,49 @@
+"""Experiments, and what may be changed of them."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from app.api.models.board import BoardGeometry
+from app.api.models.strict import Strict
+
+
+class ExperimentLine(Strict):
+    """One line of the list of experiments; `uncalibrated` names the parts of the rig that need it still."""
+
+    experiment: str
+    title: str
+    information: str
+    camera: str
+    projector: bool
+    light: Literal["texture", "projector"]
+    calibrated: bool
+    uncalibrated: list[str]
+    planned: bool
+    captures: int
+    results: int
+    changed: str
+
+
+class ExperimentResource(ExperimentLine):
+    """One experiment with its rig and scene as they stand in experiment.toml."""
+
+    settings: dict[str, Any]
+
+
+class NewExperiment(Strict):
+    """A simulated rig before the packaged room; real rigs are described in experiment.toml."""
+
+    kind: Literal["simulated"]
+    title: str = Field(default="Simulated room", min_length=1, max_length=200)
+    camera_px: int = Field(default=384, ge=64, le=4096)
+    light: Literal["texture", "projector"] = "texture"
+    boundary: Literal["paper", "operator", "surveyed"] = "surveyed"
+
+
+class ExperimentChange(Strict):
+    """What people wrote about it, and the board that its rig is calibrated with."""
+
+    title: str | None = Field(default=None, max_length=200)
+    information: str | None = Field(default=None, max_length=10_000)
+    board: BoardGeometry | None = None

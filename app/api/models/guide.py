@@ -1,0 +1,76 @@
+"""The guided calibration: what is wanted, what was found, what is asked for."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.api.models.board import BoardGeometry
+from app.api.models.strict import Strict
+
+StepText = Literal["camera", "projector", "wall", "response"]
+
+
+class WantedResource(Strict):
+    """What to arrange next, in words; a board's place as parts of the picture, and which edge is nearer."""
+
+    kind: Literal["board", "place", "wall", "level", "dark", "light"]
+    text: str
+    column: float | None
+    row: float | None
+    span: float | None
+    nearer: Literal["", "left", "right", "upper", "lower"]
+    tilt_deg: float
+    roll_deg: float
+
+
+class GuideView(Strict):
+    """One view of the board; retake it by its name."""
+
+    name: str
+    points: int
+    rms_px: float | None
+    issues: list[str]
+
+
+class GuideResource(Strict):
+    """A guided calibration. While `state` is running, `done` of `total` pictures of `wanted` are taken.
+
+    `busy` is true also while another step, or another experiment's, takes pictures: none can be begun.
+    `coverage` holds rows of cells from the picture's top left; `residuals_px` holds column, row, and the
+    residual there, in pixels of a picture of `width_px` x `height_px`.
+    """
+
+    state: Literal["idle", "running", "failed"]
+    busy: bool
+    step: StepText
+    reason: str
+    wanted: WantedResource | None
+    done: int
+    total: int
+    issues: list[str]
+    complete: bool
+    views: list[GuideView]
+    width_px: int | None
+    height_px: int | None
+    coverage: list[list[bool]]
+    covered: float
+    rms_px: float | None
+    residuals_px: list[tuple[float, float, float, float]]
+    advice: list[str]
+
+
+class GuideRequest(Strict):
+    """Which step, and how; without a board, the experiment's own is used (rehearsals have one).
+
+    `anchor` is a wall point seen at u, v whose world x, z [m] were measured.
+    """
+
+    step: StepText
+    board: BoardGeometry | None = None
+    frames: int = Field(default=1, ge=1, le=1000)
+    response_frames: int = Field(default=16, ge=2, le=1000)
+    settle_s: float = Field(default=0.2, ge=0, le=60)
+    anchor: tuple[float, float, float, float] | None = None
+    plumb_px: tuple[float, float, float, float] | None = None
+    ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
+    minutes_on: float | None = Field(default=None, ge=0, le=1e6)

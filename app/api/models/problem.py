@@ -1,0 +1,28 @@
+"""What every refusal and failure looks like: RFC 9457 problem details."""
+
+from pydantic import BaseModel, ConfigDict
+
+MEDIA_TYPE = "application/problem+json"
+
+
+class FieldError(BaseModel):
+    """One field that was not accepted."""
+
+    model_config = ConfigDict(extra="forbid")
+    field: str
+    message: str
+
+
+class Problem(BaseModel):
+    """RFC 9457 problem details. `detail` is written for the operator and is shown as it is."""
+
+    model_config = ConfigDict(extra="forbid")
+    type: str
+    title: str
+    status: int
+    code: str
+    detail: str
+    cause: str
+    next_step: str
+    instance: str | None = None
+    errors: list[FieldError] = []

@@ -1,0 +1,80 @@
+"""Results, their fields, and how they compare with what is known."""
+
+from typing import Any, Literal
+
+from app.api.models.strict import Strict
+
+Kind = Literal["found", "uncertainty", "truth", "error"]
+Form = Literal["nc", "h5", "vti", "csv", "zip", "png"]
+
+
+class PresetResource(Strict):
+    """A named way to solve."""
+
+    preset: str
+    about: str
+
+
+class ResultLine(Strict):
+    """One line of the list of results. `interrupted` ones have no manifest and are never used."""
+
+    result: str
+    state: str
+    created: str | None
+    preset: str | None
+    outcome: str | None
+
+
+class FieldResource(Strict):
+    """One scalar on the result's vertices; `low` and `high` leave out a hundredth on each side."""
+
+    name: str
+    unit: str
+    label: str
+    kind: Kind
+    minimum: float
+    maximum: float
+    low: float
+    high: float
+    mean: float
+
+
+class ResultResource(Strict):
+    """A result: its grid, its fields, how it ended, and the manifest that says where it came from."""
+
+    result: str
+    x_m: list[float]
+    y_m: list[float]
+    z_m: list[float]
+    fields: list[FieldResource]
+    outcome: str
+    advice: str
+    solver_s: float
+    notes: list[str]
+    manifest: dict[str, Any]
+
+
+class ScoreResource(Strict):
+    """One figure against the truth, in words."""
+
+    name: str
+    value: float
+    unit: str
+
+
+class ReadingResource(Strict):
+    """One quantity at one point sensor: measured, with its standard deviation, and found there."""
+
+    name: str
+    unit: str
+    position_m: list[float]
+    measured: float
+    std: float
+    found: float
+
+
+class ComparisonResource(Strict):
+    """A result against what is known better; empty lists where nothing is."""
+
+    scores: list[ScoreResource]
+    readings: list[ReadingResource]
