@@ -6,7 +6,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 # Tests start many processes: what one has compiled of Python's sources the next ones need not.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test chromium check format bench lock setup
+.PHONY: demo test chromium check format types bench lock setup
 setup: .venv/.installed
 
 .venv/.installed: requirements.lock pyproject.toml
@@ -33,10 +33,16 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/python web/hatch_build.py check
 
 format: setup
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+	$(BIN)/python web/hatch_build.py format
+
+# The page's types of the API, from the service's own description.
+types: setup
+	$(BIN)/python web/schema.py
 
 bench: setup
 	$(BIN)/airlens bench --help

@@ -1,7 +1,9 @@
 """Builds the operator's page with PyPI's Node.js, so that no Node.js is needed on the machine.
 
 A wheel without its page is refused. An editable install goes on without it and says what to do, because the
-command line and the API work without the page. Also a command: `python web/hatch_build.py` builds the page.
+command line and the API work without the page. Also a command: `python web/hatch_build.py` builds the page,
+`python web/hatch_build.py check` runs its type checker and the check of its format, and
+`python web/hatch_build.py format` formats it.
 """
 
 import hashlib
@@ -14,6 +16,8 @@ from typing import Any
 WEB = Path(__file__).resolve().parent
 DIST = WEB / "dist"
 STAMP = DIST / ".sources"
+LOCK = WEB / "package-lock.json"
+PACKAGES = WEB / "node_modules"
 
 try:
     from hatchling.builders.hooks.plugin.interface import BuildHookInterface as Interface
@@ -46,9 +50,18 @@ def build() -> None:
     sources = fingerprint()
     if STAMP.is_file() and STAMP.read_text(encoding="utf-8") == sources:
         return
-    node("npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts")
+    install()
     node("npm", "run", "build")
     STAMP.write_text(sources, encoding="utf-8")
+
+
+def install() -> None:
+    """Install the locked packages unless these very ones are there."""
+    wanted, stamp = hashlib.sha256(LOCK.read_bytes()).hexdigest(), PACKAGES / ".lock"
+    if stamp.is_file() and stamp.read_text(encoding="utf-8") == wanted:
+        return
+    node("npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts")
+    stamp.write_text(wanted, encoding="utf-8")
 
 
 def fingerprint() -> str:
@@ -80,7 +93,7 @@ def node(program: str, *arguments: str) -> None:
     )
     if done.returncode != 0:
         output = f"{done.stdout or ''}{done.stderr or ''}"
-        raise subprocess.SubprocessError(f"{program} {arguments[0]} failed:\n{output[-2000:]}")
+        raise subprocess.SubprocessError(f"{program} {' '.join(arguments)} failed:\n{output[-8000:]}")
 
 
 def explain(error: Exception) -> str:
@@ -91,16 +104,23 @@ def explain(error: Exception) -> str:
     )
 
 
-def main() -> int:
-    """Build the page; exit status 1 with the reason when that fails."""
+def main(wanted: str = "build") -> int:
+    """Build, check or format the page; exit status 1 with the reason when that fails."""
     try:
-        build()
+        if wanted == "build":
+            build()
+            told = f"The page is built: {DIST}"
+        else:
+            install()
+            node("npm", "run", wanted)
+            told = f"The page: {wanted} done."
     except (OSError, subprocess.SubprocessError, ImportError) as error:
-        sys.stderr.write(f"The page was not built: {explain(error)}\n")
+        reason = explain(error) if wanted == "build" else str(error)
+        sys.stderr.write(f"The page: {wanted} failed. {reason}\n")
         return 1
-    sys.stdout.write(f"The page is built: {DIST}\n")
+    sys.stdout.write(f"{told}\n")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(*sys.argv[1:2]))
