@@ -226,7 +226,8 @@ class Bench {
   private listen(): void {
     const stream = new EventSource("/api/events");
     const heard = (message: MessageEvent<string>) => this.hear(JSON.parse(message.data) as ServiceEvent);
-    for (const kind of ["job", "device", "capture", "calibration", "log", "experiment"]) stream.addEventListener(kind, heard);
+    for (const kind of ["job", "device", "capture", "calibration", "log", "experiment"])
+      stream.addEventListener(kind, heard);
     stream.onopen = () => {
       if (!this.connected) void this.later("all");
       this.connected = true;
@@ -248,8 +249,7 @@ class Bench {
     else if (event.kind === "calibration") {
       this.guided++;
       if (event.body["state"] !== "running") void this.later("all");
-    }
-    else if (event.job) {
+    } else if (event.job) {
       this.progress(event);
       if (event.kind === "state") void this.later("all");
     }

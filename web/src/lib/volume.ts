@@ -139,7 +139,12 @@ export function createScene(place: HTMLElement): Scene3d {
 }
 
 /** From the front, a little to the left and above; z points upwards. */
-function lookFrom(camera: ReturnType<ReturnType<ReturnType<typeof vtkGenericRenderWindow.newInstance>["getRenderer"]>["getActiveCamera"]>, centre: number[]) {
+function lookFrom(
+  camera: ReturnType<
+    ReturnType<ReturnType<typeof vtkGenericRenderWindow.newInstance>["getRenderer"]>["getActiveCamera"]
+  >,
+  centre: number[],
+) {
   const [x = 0, y = 0, z = 0] = centre;
   camera.setFocalPoint(x, y, z);
   camera.setPosition(x - 0.55, y - 1, z + 0.45);
