@@ -23,9 +23,7 @@ def description() -> dict[str, Any]:
 
 def seal(described: dict[str, Any], types: str) -> str:
     """Return a hash over a description (without the program's version) and the types made from it."""
-    content = json.dumps(
-        {key: value for key, value in described.items() if key != "info"}, sort_keys=True
-    )
+    content = json.dumps({key: value for key, value in described.items() if key != "info"}, sort_keys=True)
     return hashlib.sha256(f"{content}\0{types}".encode()).hexdigest()
 
 
