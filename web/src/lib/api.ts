@@ -1,12 +1,9 @@
-// The service's resources as the page uses them. Errors are the service's own words, shown as they are.
+// The service's resources. A request is written as in its description, "GET /jobs/{job}", and the types of
+// what it takes and answers follow from that. Errors are the service's own words, shown as they are.
+import type { paths, Problem as Told } from "./schema";
 
-export interface Problem {
-  code: string;
-  title: string;
-  detail: string;
-  status: number;
-  instance?: string;
-}
+/** What the page needs of a refusal; what lies beyond the service has no more. */
+export type Problem = Pick<Told, "code" | "title" | "detail" | "status">;
 
 export class ProblemError extends Error {
   constructor(readonly problem: Problem) {
@@ -14,15 +11,54 @@ export class ProblemError extends Error {
   }
 }
 
-export type Query = Record<string, string | number>;
+type Verb = "get" | "post" | "put" | "patch" | "delete";
+type Named<P> = P extends `/api${infer Rest}` ? Rest : never;
+type Offered<P extends keyof paths> = {
+  [V in Verb]: paths[P] extends { [K in V]: { responses: unknown } } ? `${Uppercase<V>} ${Named<P>}` : never;
+}[Verb];
 
-export async function ask<T>(method: string, path: string, body?: unknown): Promise<T> {
-  const answer = await reach(method, path, body);
-  return (answer.status === 204 ? undefined : await answer.json()) as T;
+/** Every request that the service describes. */
+export type Request = { [P in keyof paths]: Offered<P> }[keyof paths];
+
+type Operation<R extends Request> = R extends `${infer V} ${infer P}`
+  ? `/api${P}` extends keyof paths
+    ? Lowercase<V> extends keyof paths[`/api${P}`]
+      ? paths[`/api${P}`][Lowercase<V>]
+      : never
+    : never
+  : never;
+type Parameters<O> = O extends { parameters: infer Q } ? Q : never;
+type InPath<O> = Parameters<O> extends { path: infer Q } ? Q : unknown;
+type InQuery<O> = Parameters<O> extends { query: infer Q } | { query?: infer Q } ? Some<NonNullable<Q>> : unknown;
+type Some<Q> = [Q] extends [never] ? unknown : Partial<Q>;
+type Good<O> = O extends { responses: infer A } ? A[Extract<keyof A, 200 | 201 | 202>] : never;
+
+/** What a request names: the parts of its path and of its query. */
+export type Given<R extends Request> = InPath<Operation<R>> & InQuery<Operation<R>>;
+/** What a request sends. */
+export type Body<R extends Request> =
+  Operation<R> extends { requestBody?: { content: { "application/json": infer B } } } ? B : undefined;
+/** What the service answers. */
+export type Answer<R extends Request> = Content<Good<Operation<R>>>;
+type Content<A> = [A] extends [never] ? undefined : A extends { content: { "application/json": infer T } } ? T : never;
+
+/** Sends a request and returns its answer. Throws a ProblemError. */
+export async function ask<R extends Request>(request: R, given: Given<R>, body?: Body<R>): Promise<Answer<R>> {
+  const answer = await reach(verbOf(request), address(request, given), body);
+  return (answer.status === 204 ? undefined : await answer.json()) as Answer<R>;
 }
 
-export const get = <T>(path: string, query: Query = {}) => ask<T>("GET", path + queryOf(query));
-export const post = <T>(path: string, body: unknown = {}) => ask<T>("POST", path, body);
+/** The address of a request, for a picture, a stream or a file. */
+export function address<R extends Request>(request: R, given: Given<R>): string {
+  const left = new Map(Object.entries(given as Record<string, string | number | undefined>));
+  const path = request.replace(/^\w+ /, "").replace(/\{(\w+)\}/g, (_, name: string) => {
+    const value = left.get(name);
+    left.delete(name);
+    return encodeURIComponent(String(value));
+  });
+  const query = [...left].flatMap(([name, value]) => (value === undefined ? [] : [[name, String(value)]]));
+  return `/api${path}${query.length ? `?${new URLSearchParams(query)}` : ""}`;
+}
 
 export interface Numbers {
   values: Float32Array;
@@ -30,18 +66,22 @@ export interface Numbers {
 }
 
 /** Reads scaled 16-bit (or plain 32-bit) numbers into floats. */
-export async function numbers(path: string, query: Query = {}): Promise<Numbers> {
-  const encoding = query["encoding"] ?? "u16";
-  const answer = await reach("GET", path + queryOf({ ...query, encoding }));
+export async function numbers<R extends Request>(request: R, given: Given<R>): Promise<Numbers> {
+  const answer = await reach("GET", address(request, given));
   const offset = Number(answer.headers.get("X-Offset"));
   const scale = Number(answer.headers.get("X-Scale"));
   const shape = (answer.headers.get("X-Shape") ?? "").split(",").map(Number);
   const raw = await answer.arrayBuffer();
-  if (encoding === "f32") return { values: new Float32Array(raw), shape };
+  if (raw.byteLength === 4 * shape.reduce((n, m) => n * m, 1)) return { values: new Float32Array(raw), shape };
   const packed = new Uint16Array(raw);
   const values = new Float32Array(packed.length);
   for (let i = 0; i < packed.length; i++) values[i] = offset + scale * (packed[i] ?? 0);
   return { values, shape };
+}
+
+/** Reads a file that the service makes. */
+export async function file<R extends Request>(request: R, given: Given<R>): Promise<Response> {
+  return reach("GET", address(request, given));
 }
 
 /** Exchanges the token in the address for a cookie that no script can read, and forgets it. */
@@ -49,8 +89,10 @@ export async function openSession(): Promise<void> {
   const token = new URLSearchParams(location.hash.slice(1)).get("token");
   if (!token) return;
   history.replaceState(null, "", location.pathname);
-  await reach("POST", "/session", undefined, { Authorization: `Bearer ${token}` });
+  await reach("POST", address("POST /session", {}), undefined, { Authorization: `Bearer ${token}` });
 }
+
+const verbOf = (request: string) => request.slice(0, request.indexOf(" "));
 
 async function reach(
   method: string,
@@ -62,7 +104,7 @@ async function reach(
   const type: Record<string, string> = body === undefined ? {} : { "Content-Type": "application/json" };
   let answer: Response;
   try {
-    answer = await fetch(`/api${path}`, { method, headers: { ...type, ...headers }, ...sent });
+    answer = await fetch(path, { method, headers: { ...type, ...headers }, ...sent });
   } catch {
     throw new ProblemError(unreachable());
   }
@@ -87,9 +129,4 @@ function unreachable(): Problem {
       "If it stays away, run `airlens serve` again.",
     status: 0,
   };
-}
-
-function queryOf(query: Query): string {
-  const pairs = Object.entries(query).map(([name, value]) => [name, String(value)]);
-  return pairs.length ? `?${new URLSearchParams(pairs)}` : "";
 }

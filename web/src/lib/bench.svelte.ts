@@ -1,12 +1,25 @@
 // What the page knows of the service, kept fresh by one stream of events. Nothing here is the only copy:
 // closing the tab loses nothing.
-import { ask, get, openSession, post, ProblemError, type Problem } from "./api";
-import type { Camera, Capture, Desk, Experiment, Job, Projector, ResultLine, ServiceEvent } from "./types";
+import { address, ask, file, openSession, ProblemError, type Given, type Problem } from "./api";
+import type {
+  CameraResource,
+  CaptureResource,
+  DeskResource,
+  EventResource,
+  ExperimentLine,
+  JobResource,
+  NewCapture,
+  ProjectorResource,
+  ResultLine,
+} from "./schema";
 
 export const PAGES = ["Rig", "Calibrate", "Plan", "Capture", "Reconstruct", "Look"] as const;
 export type Page = (typeof PAGES)[number];
 
 const ACTIVE = ["queued", "running", "pausing", "cancelling", "lost"];
+
+export type Action = Given<"POST /jobs/{job}/{action}">["action"];
+export type Format = Given<"GET /experiments/{experiment}/results/{result}/exports/{form}">["form"];
 
 export interface Step {
   label: string;
@@ -18,13 +31,13 @@ export interface Step {
 class Bench {
   page = $state<Page>("Rig");
   connected = $state(false);
-  experiments = $state.raw<Experiment[]>([]);
+  experiments = $state.raw<ExperimentLine[]>([]);
   experiment = $state<string | null>(null);
-  camera = $state.raw<Camera | null>(null);
-  projector = $state.raw<Projector | null>(null);
-  desk = $state.raw<Desk | null>(null);
-  captures = $state.raw<Capture[]>([]);
-  jobs = $state.raw<Job[]>([]);
+  camera = $state.raw<CameraResource | null>(null);
+  projector = $state.raw<ProjectorResource | null>(null);
+  desk = $state.raw<DeskResource | null>(null);
+  captures = $state.raw<CaptureResource[]>([]);
+  jobs = $state.raw<JobResource[]>([]);
   results = $state.raw<ResultLine[]>([]);
   result = $state<string | null>(null);
   problem = $state.raw<Problem | null>(null);
@@ -35,6 +48,11 @@ class Bench {
 
   private stream: EventSource | null = null;
   private pending = new Set<string>();
+
+  /** The experiment that actions are about. */
+  get here(): string {
+    return this.experiment ?? "";
+  }
 
   current = $derived(this.experiments.find((one) => one.experiment === this.experiment) ?? null);
   active = $derived(this.jobs.filter((job) => ACTIVE.includes(job.state)));
@@ -70,11 +88,11 @@ class Bench {
 
   async refresh(): Promise<void> {
     [this.experiments, this.camera, this.projector, this.desk, this.jobs] = await Promise.all([
-      get<Experiment[]>("/experiments"),
-      get<Camera>("/devices/camera"),
-      get<Projector>("/devices/projector"),
-      get<Desk>("/captures/running"),
-      get<Job[]>("/jobs"),
+      ask("GET /experiments", {}),
+      ask("GET /devices/camera", {}),
+      ask("GET /devices/projector", {}),
+      ask("GET /captures/running", {}),
+      ask("GET /jobs", {}),
     ]);
     const known = this.experiments.some((one) => one.experiment === this.experiment);
     if (!known) this.experiment = this.camera.experiment ?? this.experiments[0]?.experiment ?? null;
@@ -83,17 +101,17 @@ class Bench {
 
   async refreshDevices(): Promise<void> {
     [this.camera, this.projector] = await Promise.all([
-      get<Camera>("/devices/camera"),
-      get<Projector>("/devices/projector"),
+      ask("GET /devices/camera", {}),
+      ask("GET /devices/projector", {}),
     ]);
   }
 
   async refreshExperiment(): Promise<void> {
     if (!this.experiment) return;
-    const path = `/experiments/${this.experiment}`;
+    const here = { experiment: this.experiment };
     [this.captures, this.results] = await Promise.all([
-      get<Capture[]>(`${path}/captures`),
-      get<ResultLine[]>(`${path}/results`),
+      ask("GET /experiments/{experiment}/captures", here),
+      ask("GET /experiments/{experiment}/results", here),
     ]);
     const finished = this.results.filter((one) => one.state === "finished");
     if (!finished.some((one) => one.result === this.result)) this.result = finished[0]?.result ?? null;
@@ -109,62 +127,65 @@ class Bench {
 
   async createSimulated(light: "texture" | "projector" = "texture"): Promise<void> {
     const title = light === "texture" ? "Simulated room" : "Simulated room, projected light";
-    const made = await post<Experiment>("/experiments", { kind: "simulated", title, light });
+    const made = await ask("POST /experiments", {}, { kind: "simulated", title, light });
     this.experiment = made.experiment;
     await this.connect();
     await this.refresh();
   }
 
   async connect(): Promise<void> {
-    this.camera = await post<Camera>("/devices/camera/connect", { experiment: this.experiment });
+    this.camera = await ask("POST /devices/camera/connect", {}, { experiment: this.here });
   }
 
   async disconnect(): Promise<void> {
-    this.camera = await post<Camera>("/devices/camera/disconnect");
+    this.camera = await ask("POST /devices/camera/disconnect", {});
   }
 
   async connectProjector(): Promise<void> {
-    this.projector = await post<Projector>("/devices/projector/connect", { experiment: this.experiment });
+    this.projector = await ask("POST /devices/projector/connect", {}, { experiment: this.here });
   }
 
   async disconnectProjector(): Promise<void> {
-    this.projector = await post<Projector>("/devices/projector/disconnect");
+    this.projector = await ask("POST /devices/projector/disconnect", {});
   }
 
   async calibrate(): Promise<void> {
-    await post(`/experiments/${this.experiment}/calibration`, { kind: "simulated" });
+    await ask("POST /experiments/{experiment}/calibration", { experiment: this.here }, { kind: "simulated" });
     await this.refresh();
   }
 
-  async capture(role: string, frames: number): Promise<void> {
-    this.desk = await post<Desk>(`/experiments/${this.experiment}/captures`, { role, frames });
+  async capture(role: NewCapture["role"], frames: number): Promise<void> {
+    this.desk = await ask("POST /experiments/{experiment}/captures", { experiment: this.here }, { role, frames });
   }
 
   async abort(discard: boolean): Promise<void> {
-    this.desk = await post<Desk>("/captures/running/abort", { discard });
+    this.desk = await ask("POST /captures/running/abort", {}, { discard });
     await this.refreshExperiment();
   }
 
   async reconstruct(preset: string): Promise<void> {
-    await post<Job>("/jobs", {
-      kind: "reconstruct",
-      experiment: this.experiment,
-      title: `${preset}: ${this.current?.title ?? this.experiment}`,
-      settings: { preset },
-      key: crypto.randomUUID(),
-    });
-    this.jobs = await get<Job[]>("/jobs");
+    await ask(
+      "POST /jobs",
+      {},
+      {
+        kind: "reconstruct",
+        experiment: this.here,
+        title: `${preset}: ${this.current?.title ?? this.experiment}`,
+        settings: { preset },
+        key: crypto.randomUUID(),
+      },
+    );
+    this.jobs = await ask("GET /jobs", {});
   }
 
-  async act(job: Job, action: string): Promise<void> {
-    await ask<Job>("POST", `/jobs/${job.job}/${action}`, {});
-    this.jobs = await get<Job[]>("/jobs");
+  async act(job: JobResource, action: Action): Promise<void> {
+    await ask("POST /jobs/{job}/{action}", { job: job.job, action });
+    this.jobs = await ask("GET /jobs", {});
   }
 
-  async export(format: string): Promise<void> {
-    const path = `/experiments/${this.experiment}/results/${this.result}/exports/${format}`;
-    const answer = await fetch(`/api${path}`);
-    if (!answer.ok) throw new ProblemError((await answer.json()) as Problem);
+  async export(format: Format): Promise<void> {
+    const wanted = { experiment: this.here, result: this.result ?? "", form: format };
+    const answer = await file("GET /experiments/{experiment}/results/{result}/exports/{form}", wanted);
     const link = document.createElement("a");
     link.href = URL.createObjectURL(await answer.blob());
     const named = /filename="?([^";]+)/.exec(answer.headers.get("Content-Disposition") ?? "");
@@ -176,10 +197,10 @@ class Bench {
 
   /** Opens the report in a window of its own; a refusal is shown here, not there. */
   async report(result: string): Promise<void> {
-    const address = `/api/experiments/${this.experiment}/results/${result}/report`;
-    const answer = await fetch(address);
-    if (!answer.ok) throw new ProblemError((await answer.json()) as Problem);
-    window.open(address, "_blank", "noopener,noreferrer");
+    const wanted = { experiment: this.here, result };
+    await file("GET /experiments/{experiment}/results/{result}/report", wanted);
+    const found = address("GET /experiments/{experiment}/results/{result}/report", wanted);
+    window.open(found, "_blank", "noopener,noreferrer");
     this.done = "Opened the report";
   }
 
@@ -224,8 +245,8 @@ class Bench {
   // Events
 
   private listen(): void {
-    const stream = new EventSource("/api/events");
-    const heard = (message: MessageEvent<string>) => this.hear(JSON.parse(message.data) as ServiceEvent);
+    const stream = new EventSource(address("GET /events", {}));
+    const heard = (message: MessageEvent<string>) => this.hear(JSON.parse(message.data) as EventResource);
     for (const kind of ["job", "device", "capture", "calibration", "log", "experiment"])
       stream.addEventListener(kind, heard);
     stream.onopen = () => {
@@ -240,9 +261,9 @@ class Bench {
     this.stream = stream;
   }
 
-  private hear(event: ServiceEvent): void {
+  private hear(event: EventResource): void {
     if (event.kind === "capture") {
-      if (this.desk) this.desk = { ...this.desk, ...(event.body as Partial<Desk>) };
+      if (this.desk) this.desk = { ...this.desk, ...(event.body as Partial<DeskResource>) };
       if (event.body["state"] !== "running") void this.later("experiment");
     } else if (event.kind === "device") void this.later("devices");
     else if (event.kind === "experiment") void this.later("all");
@@ -255,7 +276,7 @@ class Bench {
     }
   }
 
-  private progress(event: ServiceEvent): void {
+  private progress(event: EventResource): void {
     const { step, steps } = event.body;
     if (typeof step !== "number" || typeof steps !== "number") return;
     const progress = steps > 0 ? Math.min(1, step / steps) : 0;
@@ -272,7 +293,7 @@ class Bench {
       if (what === "devices") await this.refreshDevices();
       else if (what === "experiment") await this.refreshExperiment();
       else await this.refresh();
-      if (what === "experiment") this.desk = await get<Desk>("/captures/running");
+      if (what === "experiment") this.desk = await ask("GET /captures/running", {});
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
       if (error.problem.code !== "unreachable") this.problem = error.problem;

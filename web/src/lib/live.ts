@@ -1,5 +1,17 @@
 // The live picture: one credit a frame, so that a slow page skips frames instead of falling behind.
-import type { LiveNumbers } from "./types";
+
+/** What is told with each frame of the socket, which the description has no place for. */
+export interface LiveNumbers {
+  number: number;
+  timestamp_s: number;
+  rows: number;
+  cols: number;
+  mean: number;
+  saturated: number;
+  dark: number;
+  sharpness_nd: number;
+  histogram: number[];
+}
 
 export interface LiveSight {
   numbers: LiveNumbers;

@@ -1,7 +1,7 @@
 // The plan of the experiment in use: read when there is one, made by a job of its own.
-import { get, post, ProblemError } from "./api";
+import { ask, ProblemError } from "./api";
 import { bench } from "./bench.svelte";
-import type { Job, Plan, PlannedPreset } from "./types";
+import type { Plan, PresetLine } from "./schema";
 
 class Planned {
   plan = $state.raw<Plan | null>(null);
@@ -14,7 +14,7 @@ class Planned {
       return;
     }
     try {
-      this.plan = await get<Plan>(`/experiments/${experiment}/plan`);
+      this.plan = await ask("GET /experiments/{experiment}/plan", { experiment });
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
       bench.problem = error.problem;
@@ -22,17 +22,21 @@ class Planned {
   }
 
   async make(excess_k: number | null): Promise<void> {
-    await post<Job>("/jobs", {
-      kind: "plan",
-      experiment: bench.experiment,
-      title: `plan: ${bench.current?.title ?? bench.experiment}`,
-      settings: excess_k === null ? {} : { excess_k },
-      key: crypto.randomUUID(),
-    });
-    bench.jobs = await get<Job[]>("/jobs");
+    await ask(
+      "POST /jobs",
+      {},
+      {
+        kind: "plan",
+        experiment: bench.here,
+        title: `plan: ${bench.current?.title ?? bench.experiment}`,
+        settings: excess_k === null ? {} : { excess_k },
+        key: crypto.randomUUID(),
+      },
+    );
+    bench.jobs = await ask("GET /jobs", {});
   }
 
-  preset(name: string): PlannedPreset | null {
+  preset(name: string): PresetLine | null {
     return this.plan?.presets.find((one) => one.preset === name) ?? null;
   }
 }
