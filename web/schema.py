@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from app.api import create_app
+from app.api.factory import create_app
 from app.api.security.settings import new_token, service_config
 
 WEB = Path(__file__).resolve().parent
