@@ -11,18 +11,36 @@ with the displacement d in px, (column, row), of the pattern seen from I_ref to 
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from core.scene import Scene
 
 
 class ShiftMeasurement(eqx.Module):
-    """What one view saw, compressed to windows; columns first in every 2-vector."""
+    """What one view saw, compressed to windows; columns first in every 2-vector.
+
+    `refused` marks windows that show something else than the pattern, moved; None where all are good.
+    """
 
     centres_px: Float[np.ndarray, "windows 2"]
     displacement_px: Float[np.ndarray, "windows 2"]
     information_per_px2: Float[np.ndarray, "windows 2 2"]
     window_px: int = eqx.field(static=True)
+    refused: Bool[np.ndarray, " windows"] | None = None
+
+    def at(self, chosen: Bool[np.ndarray, " windows"]) -> "ShiftMeasurement":
+        """Only the windows that are chosen."""
+        return ShiftMeasurement(
+            self.centres_px[chosen],
+            self.displacement_px[chosen],
+            self.information_per_px2[chosen],
+            self.window_px,
+            None if self.refused is None else self.refused[chosen],
+        )
+
+    def good(self) -> "ShiftMeasurement":
+        """Without the windows that were refused."""
+        return self if self.refused is None else self.at(~self.refused)
 
 
 class ImagePair(eqx.Module):

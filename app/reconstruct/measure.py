@@ -12,19 +12,12 @@ from app.experiment.boundary import read_planes, read_sensors
 from app.experiment.captures import Capture, load_capture
 from app.experiment.folder import Experiment
 from core.camera_noise import frame_variance
-from core.displacement import (
-    Similarity,
-    derivative_filter,
-    fit_similarity,
-    measure_shift,
-    move_image,
-    resolve_window_px,
-    similarity_basis,
-    window_centres,
-)
+from core.displacement import measure_shift, resolve_window_px, window_centres
+from core.drift import Similarity, fit_similarity, move_image, similarity_basis
 from core.problem import Problem, ShiftMeasurement
 from core.rays.visibility import sees_wall
 from core.scene import Scene, View
+from core.window_fit import derivative_filter
 
 Image = Float32[np.ndarray, "rows cols"]
 

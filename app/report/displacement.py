@@ -14,7 +14,8 @@ import xarray as xr
 from jaxtyping import Float32
 
 from app.files.durable import durable_path
-from core.displacement import Similarity, check_pair, fit_similarity
+from core.displacement import check_pair
+from core.drift import Similarity, fit_similarity
 from core.problem import ShiftMeasurement
 
 Image = Float32[np.ndarray, "rows cols"]

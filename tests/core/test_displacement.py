@@ -2,15 +2,10 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from core.displacement import (
-    Similarity,
-    derivative_filter,
-    fit_similarity,
-    measure_shift,
-    move_image,
-    standard_deviation_px,
-)
+from core.displacement import measure_shift, standard_deviation_px
+from core.drift import Similarity, fit_similarity, move_image
 from core.setting import SettingError
+from core.window_fit import derivative_filter
 
 
 def band_limited(shape, seed, shift=(0.0, 0.0), shortest_px=3.0):
@@ -104,3 +99,69 @@ def test_a_blank_window_says_that_it_knows_nothing():
 def test_pairs_that_cannot_be_compared_are_refused(flow_shape, words):
     with pytest.raises(SettingError, match=words):
         measure_shift(np.ones((64, 64), np.float32), np.ones(flow_shape, np.float32), 1.0, 80)
+
+
+def seen_by_a_camera(image, frames, rng, full_well_e=1e4):
+    """A picture as so many frames show it on average: shot noise only. And the variance of that mean."""
+    variance = np.maximum(image, 1e-3) / full_well_e / frames
+    return (image + rng.standard_normal(image.shape) * np.sqrt(variance)).astype(np.float32), variance
+
+
+@pytest.mark.parametrize(
+    ("shift_px", "light", "frames"),
+    [(0.02, 0.5, 100), (0.3, 0.5, 100), (2.0, 0.5, 100), (5.0, 0.5, 100), (0.3, 0.03, 1)],
+)
+def test_a_local_shift_of_any_length_is_found_within_what_is_stated(shift_px, light, frames):
+    shift = shift_px * np.array([1.0, -0.6])
+    rng = np.random.default_rng(7)
+    pictures = [2 * light * band_limited((256, 256), 8, s, shortest_px=5.0) for s in ((0, 0), shift)]
+    (reference, before), (flow, after) = (seen_by_a_camera(p.astype(float), frames, rng) for p in pictures)
+
+    found = measure_shift(reference, flow, before + after, 32)
+
+    inner = np.all((found.centres_px > 40) & (found.centres_px < 216), axis=1)
+    error = found.displacement_px[inner] - shift
+    z = error / standard_deviation_px(found)[inner]
+    # 32 numbers: their rms is known to 13 %; three sigma.
+    assert 0.6 < np.sqrt(np.mean(z**2)) < 1.4
+    # One picture in dim light without the noise taken out of the matrix: -15 %, twelve of these deviations.
+    assert abs(np.mean(z @ shift) / np.hypot(*shift)) < 4 / np.sqrt(len(z))
+
+
+def test_a_lamp_that_ripples_does_not_pass_for_a_shift():
+    rng = np.random.default_rng(1)
+    reference = band_limited((256, 256), 8, shortest_px=5.0).astype(float)
+    flow = band_limited((256, 256), 8, (0.01, 0.0), shortest_px=5.0).astype(float)
+    flow *= 1 + 0.01 * np.cos(2 * np.pi * np.arange(256) / 60)
+    (a, before), (b, after) = seen_by_a_camera(reference, 100, rng), seen_by_a_camera(flow, 100, rng)
+
+    found = measure_shift(a, b, before + after, 32)
+
+    z = (found.displacement_px - [0.01, 0.0]) / standard_deviation_px(found)
+    assert np.sqrt(np.mean(z**2)) < 1.5
+    assert found.refused is not None
+    assert not found.refused.any()
+
+
+@pytest.mark.parametrize("covering", ["something plain", "another pattern", "a pattern that moves"])
+def test_windows_that_something_covers_are_refused_and_the_others_are_not(covering):
+    rng = np.random.default_rng(2)
+    reference = band_limited((384, 384), 8, shortest_px=5.0).astype(float)
+    flow = band_limited((384, 384), 8, (0.02, 0.01), shortest_px=5.0).astype(float)
+    rows, columns = np.mgrid[:384, :384]
+    covered = (columns - 200) ** 2 + (rows - 180) ** 2 < 70**2
+    other = band_limited((384, 384), 9, (1.5, 0.5), shortest_px=9.0)
+    flow[covered] = {"something plain": 0.35, "another pattern": other[covered]}.get(covering, 0.0)
+    if covering == "a pattern that moves":
+        reference[covered] = band_limited((384, 384), 9, shortest_px=5.0)[covered]
+        flow[covered] = band_limited((384, 384), 10, shortest_px=5.0)[covered]
+    (a, before), (b, after) = seen_by_a_camera(reference, 100, rng), seen_by_a_camera(flow, 100, rng)
+
+    found = measure_shift(a, b, before + after, 32)
+
+    share = covered.reshape(12, 32, 12, 32).mean(axis=(1, 3)).ravel()
+    # The gradient's filter reaches 10 px beyond a window.
+    clear = ndimage.maximum_filter(covered, 21).reshape(12, 32, 12, 32).max(axis=(1, 3)).ravel() == 0
+    assert found.refused is not None
+    assert found.refused[share > 0.02].mean() >= 0.95
+    assert found.refused[clear].mean() <= 0.02

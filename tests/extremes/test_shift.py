@@ -5,13 +5,8 @@ from scipy import ndimage
 
 from app.reconstruct.measure import frame_variance
 from app.report.displacement import shift_field
-from core.displacement import (
-    Similarity,
-    fit_similarity,
-    measure_shift,
-    move_image,
-    standard_deviation_px,
-)
+from core.displacement import measure_shift, standard_deviation_px
+from core.drift import Similarity, fit_similarity, move_image
 from core.problem import ShiftMeasurement
 from core.scene import CameraNoise
 from drivers.quick_look import quick_look

@@ -81,6 +81,13 @@ def _alike(one: dict[str, Any], other: dict[str, Any]) -> bool:
     return all(one[name] == other[name] for name in ("room", "information", "light"))
 
 
+def headline(rows: list[dict[str, Any]]) -> str:
+    """The README's table: what most people use, before a print."""
+    return table(
+        [row for row in rows if row["preset"] in ("draft", "standard") and row["light"] == "texture"]
+    )
+
+
 def table(rows: list[dict[str, Any]]) -> str:
     """The presets as a Markdown table: medians over rooms, one line a preset, level and light."""
     lines = [

@@ -10,7 +10,7 @@ from app.bench.parts.ray_sweep import traced
 from app.bench.tradeoff import POINTS, draw
 from app.errors import BadInputError
 from app.plan.machine import Machine, keep_machine, read_machine, this_machine
-from app.plan.tradeoff import expected_error, front, off_front, rows, span, table
+from app.plan.tradeoff import expected_error, front, headline, off_front, rows, span, table
 from app.reconstruct.presets import PRESETS
 from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.file import read_volume
@@ -18,11 +18,12 @@ from app.volume.measurement import fine_field
 from app.volume.scene import RigOptions, room_scene
 from core.plan.cost import Speed, Work
 
-README = Path(__file__).resolve().parents[3] / "README.md"
+ROOT = Path(__file__).resolve().parents[3]
 
 
-def test_the_readmes_table_is_the_committed_sweep():
-    assert table(rows()) in README.read_text(encoding="utf-8")
+def test_the_readmes_tables_are_the_committed_sweep():
+    assert headline(rows()) in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert table(rows()) in (ROOT / "app" / "plan" / "README.md").read_text(encoding="utf-8")
 
 
 def test_rows_name_presets_that_exist():
