@@ -18,7 +18,6 @@ from scipy import ndimage
 
 from app.volume.file import RoomVolume
 from app.volume.scene import Information, RigOptions, room_scene
-from core.displacement import derivative_filter
 from core.fields import GridField
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays import NonlinearTracer
@@ -26,6 +25,7 @@ from core.rays.visibility import sees_wall
 from core.render import PixelGeometry, pixel_geometry, render_reference
 from core.render.shift import wall_offset_m
 from core.scene import PlaneField, Scene
+from core.window_fit import derivative_filter
 
 TRACED_STEPS = 160
 _RAYS_A_WINDOW = 3

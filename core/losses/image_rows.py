@@ -14,7 +14,6 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy import ndimage
 
-from core.displacement import derivative_filter
 from core.losses.shifts import ShiftRows, similarity_basis
 from core.problem import ImagePair
 from core.rays.operator import build
@@ -22,6 +21,7 @@ from core.render.light import pattern_image, sample_pattern
 from core.render.pixel_geometry import PixelGeometry, pixel_geometry
 from core.scene import Scene
 from core.setting import SettingError
+from core.window_fit import derivative_filter
 
 # Above this a full-resolution term would be slower than windows and no better: they lose nothing.
 MOST_PIXELS = 300_000
