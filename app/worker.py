@@ -16,13 +16,12 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
-import psutil
-
 from app.errors import AirlensError
 from app.files.compilation_cache import use_compilation_cache
 from app.files.durable import make_folder, write_json
 from app.jobs import kinds
 from app.jobs.attempt import Attempt, AttemptStoppedError, inherit_checkpoint, publish
+from app.jobs.engines.process import started
 from app.jobs.errors import FencedError
 from app.jobs.folder import JobFolder, Owner, beat, try_lock
 from app.jobs.worker_status import DONE, FAILED, FENCED, NO_SPACE, STOPPED, TAKEN
@@ -44,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     owner = folder.owner()
     if options.attempt not in (None, owner.attempt):
         return FENCED
-    lock = try_lock(folder.attempt(owner.attempt) / "worker.lock")
+    lock = try_lock(folder.attempt(owner.attempt) / "worker.lock", wait_s=1.0)
     if lock is None:
         return TAKEN
     with lock:
@@ -115,8 +114,7 @@ def compute(folder: JobFolder, owner: Owner, stop: threading.Event) -> None:
 
 
 def _introduce(folder: JobFolder, owner: Owner) -> None:
-    process = psutil.Process()
-    content = {"pid": process.pid, "created_s": process.create_time(), "host": socket.gethostname()}
+    content = {"pid": os.getpid(), "started": started(os.getpid()), "host": socket.gethostname()}
     write_json(folder.attempt(owner.attempt) / "worker.json", content)
 
 

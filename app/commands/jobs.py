@@ -10,7 +10,18 @@ from rich.console import Console
 from rich.table import Table
 
 from app.errors import BadInputError
-from app.jobs import Event, Group, Job, JobSpec, JobState, Ledger, submit_ensemble, submit_sweep, summarise
+from app.jobs import (
+    Event,
+    Group,
+    Job,
+    JobSpec,
+    JobState,
+    Ledger,
+    explained,
+    submit_ensemble,
+    submit_sweep,
+    summarise,
+)
 from app.jobs.__main__ import supervise
 from app.jobs.study import plain as plain_summary
 
@@ -122,7 +133,8 @@ def list_jobs(
     as_json: AsJson = False,
 ) -> None:
     """List jobs: the running ones, the waiting in their order, the ended."""
-    found = Ledger(folder).jobs(states=state or None)
+    ledger = Ledger(folder)
+    found = explained(ledger, ledger.jobs(states=state or None))
     if as_json:
         typer.echo(json.dumps([plain(job) for job in found], indent=1))
         return
@@ -134,8 +146,9 @@ def list_jobs(
 
 
 def show(job: JobId, folder: Folder = HERE, as_json: AsJson = False) -> None:
-    """Show one job."""
-    _print_job(Ledger(folder).get(job), as_json)
+    """Show one job, and why it waits."""
+    ledger = Ledger(folder)
+    _print_job(explained(ledger, [ledger.get(job)])[0], as_json)
 
 
 def events(
@@ -159,7 +172,8 @@ def events(
 
 def cancel(job: JobId, folder: Folder = HERE, as_json: AsJson = False) -> None:
     """Stop a job; its checkpoint is kept and `retry` goes on from it."""
-    _print_job(Ledger(folder).cancel(job), as_json)
+    ledger = Ledger(folder)
+    _print_job(explained(ledger, [ledger.cancel(job)])[0], as_json)
 
 
 def pause(job: JobId, folder: Folder = HERE, as_json: AsJson = False) -> None:

@@ -8,6 +8,7 @@ from app.jobs.records import Event, Group, Job, JobSpec
 from app.jobs.state import JobState
 from app.jobs.study import Summary, submit_ensemble, submit_sweep, summarise
 from app.jobs.supervisor import Supervisor
+from app.jobs.waiting import explained
 
 __all__ = [
     "EngineError",
@@ -25,6 +26,7 @@ __all__ = [
     "Supervisor",
     "UnknownJobError",
     "attended",
+    "explained",
     "read_config",
     "submit_ensemble",
     "submit_sweep",

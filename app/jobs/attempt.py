@@ -35,6 +35,7 @@ class Attempt:
     experiment: Path | None
     output: Path
     stop: threading.Event = field(default_factory=threading.Event)
+    _shown: "_Pace" = field(default_factory=lambda: _Pace(SHOWN_EVERY_S))
 
     @property
     def checkpoints(self) -> Path:
@@ -60,8 +61,8 @@ class Attempt:
 
     def show(self, plane: Float32[np.ndarray, "across up"], *, last: bool = False) -> None:
         """Show how a field stands now; at most once a second but for the last, and not kept: told, not promised."""
-        path = self.folder.attempt(self.owner.attempt) / PLANE_FILE
-        if last or not path.exists() or time.time() - path.stat().st_mtime >= SHOWN_EVERY_S:
+        if self._shown.is_due() or last:
+            path = self.folder.attempt(self.owner.attempt) / PLANE_FILE
             temporary = path.with_suffix(".tmp.npy")
             np.save(temporary, np.asarray(plane, np.float32))
             temporary.replace(path)
@@ -70,6 +71,20 @@ class Attempt:
         """Raise AttemptStoppedError when the job was asked to stop. Call it after writing a checkpoint."""
         if self.stop.is_set():
             raise AttemptStoppedError
+
+
+class _Pace:
+    """Says when something is due again, by a clock that nobody sets."""
+
+    def __init__(self, every_s: float) -> None:
+        self._every_s, self._last_s = every_s, float("-inf")
+
+    def is_due(self) -> bool:
+        now_s = time.monotonic()
+        if now_s - self._last_s < self._every_s:
+            return False
+        self._last_s = now_s
+        return True
 
 
 class CheckpointClock:

@@ -10,6 +10,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from app.jobs.waiting import SUPERVISOR_LOG
+
 _PAUSE_S = 2.0
 
 
@@ -47,7 +49,7 @@ def _attend(folder: Path, stop: threading.Event) -> None:
     command = [sys.executable, "-m", "app.jobs", str(folder), "--with-parent"]
     variables = {name: value for name, value in os.environ.items() if "TOKEN" not in name}
     while not stop.is_set():
-        with open(folder / "supervisor.log", "ab") as log:
+        with open(folder / SUPERVISOR_LOG, "ab") as log:
             streams = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log}
             child = subprocess.Popen(command, env=variables, start_new_session=True, **streams)
         while child.poll() is None and not stop.wait(0.2):

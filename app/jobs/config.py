@@ -8,6 +8,8 @@ from pydantic import Field
 from app.files.toml import Strict, read_toml
 
 GIB = 1 << 30
+MOST_BYTES = 1 << 60
+LONGEST_S = 86_400.0
 
 
 class RayConfig(Strict):
@@ -16,16 +18,16 @@ class RayConfig(Strict):
     address: str = "http://127.0.0.1:8265"
     token_file: str = "~/.ray/auth_token"
     python: str = "python"
-    gpus_per_job: float = Field(default=0.0, ge=0)
-    cpus_per_job: float = Field(default=1.0, ge=0)
+    gpus_per_job: float = Field(default=0.0, ge=0, le=1000)
+    cpus_per_job: float = Field(default=1.0, ge=0, le=10_000)
 
 
 class SlurmConfig(Strict):
     """Options of `sbatch`."""
 
     partition: str = ""
-    gpus_per_job: int = Field(default=0, ge=0)
-    cpus_per_job: int = Field(default=1, ge=1)
+    gpus_per_job: int = Field(default=0, ge=0, le=1000)
+    cpus_per_job: int = Field(default=1, ge=1, le=10_000)
     time_limit: str = ""
     python: str = "python"
 
@@ -35,15 +37,15 @@ class JobsConfig(Strict):
 
     engine: Literal["local", "ray", "slurm"] = "local"
     devices: tuple[str, ...] = Field(default=("cpu:0",), min_length=1, strict=False)
-    lease_s: float = Field(default=15.0, ge=1)
-    start_limit_s: float = Field(default=60.0, gt=0)
-    stop_limit_s: float = Field(default=12.0, gt=0)
-    max_losses: int = Field(default=5, ge=1)
-    retry_first_s: float = Field(default=1.0, gt=0)
-    retry_longest_s: float = Field(default=300.0, gt=0)
-    memory_reserve_bytes: int = Field(default=GIB // 2, ge=0)
-    disk_reserve_bytes: int = Field(default=GIB // 8, ge=0)
-    poll_s: float = Field(default=0.2, gt=0)
+    lease_s: float = Field(default=15.0, ge=1, le=LONGEST_S)
+    start_limit_s: float = Field(default=60.0, gt=0, le=LONGEST_S)
+    stop_limit_s: float = Field(default=12.0, gt=0, le=LONGEST_S)
+    max_losses: int = Field(default=5, ge=1, le=1_000_000)
+    retry_first_s: float = Field(default=1.0, gt=0, le=LONGEST_S)
+    retry_longest_s: float = Field(default=300.0, gt=0, le=LONGEST_S)
+    memory_reserve_bytes: int = Field(default=GIB // 2, ge=0, le=MOST_BYTES)
+    disk_reserve_bytes: int = Field(default=GIB // 8, ge=0, le=MOST_BYTES)
+    poll_s: float = Field(default=0.2, gt=0, le=60)
     ray: RayConfig = RayConfig()
     slurm: SlurmConfig = SlurmConfig()
 

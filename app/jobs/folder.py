@@ -24,7 +24,7 @@ from typing import IO, Any
 
 from app.files.durable import make_folder, write_json
 from app.jobs import kinds
-from app.jobs.errors import FencedError
+from app.jobs.errors import FencedError, JobError
 
 _LOCK_WAIT_S = 5.0
 
@@ -44,8 +44,16 @@ class JobFolder:
     path: Path
 
     def order(self) -> dict[str, Any]:
-        """Return what job.json asks for."""
-        return json.loads((self.path / "job.json").read_text(encoding="utf-8"))
+        """Return what job.json asks for. Raises JobError when it cannot be read."""
+        path = self.path / "job.json"
+        try:
+            order = json.loads(path.read_text(encoding="utf-8"))
+            return {name: order[name] for name in ("kind", "experiment", "title", "settings", "submitted_s")}
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            raise JobError(
+                f"{path} cannot be read as an order ({type(error).__name__}: {error}). Restore it from a copy and "
+                "`retry`, or submit the job again."
+            ) from error
 
     def attempt(self, number: int) -> Path:
         """Return the folder of an attempt."""
@@ -94,16 +102,19 @@ class JobFolder:
     def locked(self) -> Iterator[None]:
         """Hold the folder's lock: the owner does not change meanwhile."""
         with open(self.path / "lock", "a") as lock:
-            _wait_for(lock, self.path)
+            _wait_for(lock, self.path, _LOCK_WAIT_S)
             yield
 
 
-def try_lock(path: Path) -> IO[str] | None:
-    """Return the file, locked until it is closed or the process dies; None when another holds it."""
+def try_lock(path: Path, wait_s: float = 0.0) -> IO[str] | None:
+    """Return the file, locked until it is closed or the process dies; None when another holds it.
+
+    `is_held` takes the lock for a moment: who must not be turned away by a look waits a little.
+    """
     lock = open(path, "a")
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+        _wait_for(lock, path, wait_s)
+    except TimeoutError:
         lock.close()
         return None
     return lock
@@ -117,6 +128,16 @@ def is_held(path: Path) -> bool:
     if lock is not None:
         lock.close()
     return lock is None
+
+
+def last_lines(path: Path, most_bytes: int = 400) -> str:
+    """Return the end of a log as one line, empty when there is none."""
+    try:
+        with open(path, "rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - most_bytes))
+            return " / ".join(file.read().decode("utf-8", "replace").split("\n")).strip(" /")
+    except OSError:
+        return ""
 
 
 def read_json(path: Path) -> dict[str, Any] | None:
@@ -136,15 +157,15 @@ def beat(path: Path, count: int) -> None:
         os.close(descriptor)
 
 
-def _wait_for(lock: IO[str], path: Path) -> None:
-    deadline_s = time.monotonic() + _LOCK_WAIT_S
+def _wait_for(lock: IO[str], path: Path, wait_s: float) -> None:
+    deadline_s = time.monotonic() + wait_s
     while True:
         try:
             return fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            if time.monotonic() > deadline_s:
+            if time.monotonic() >= deadline_s:
                 raise TimeoutError(
-                    f"{path} stayed locked for {_LOCK_WAIT_S:g} s. A stopped process may hold it; "
+                    f"{path} stayed locked for {wait_s:g} s. A stopped process may hold it; "
                     "end that process, or wait: this is tried again."
                 ) from None
             time.sleep(0.01)

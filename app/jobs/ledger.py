@@ -13,12 +13,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
+from app.errors import BadInputError
 from app.files.durable import make_folder, write_json
 from app.jobs import kinds
 from app.jobs.errors import JobError, UnknownJobError
 from app.jobs.records import Event, Group, Job, JobSpec, event_of, job_of
-from app.jobs.requests import Request, ask, log_event, move_before, requeue, state_of
-from app.jobs.state import JobState
+from app.jobs.requests import ask, log_event, move_before, state_of
+from app.jobs.state import JobEvent, JobState
 from app.jobs.store import Store
 
 _INSERT = """
@@ -27,6 +28,8 @@ INSERT INTO jobs (id, submit_key, group_id, kind, settings, experiment, title, m
 VALUES (:id, :key, :group, :kind, :settings, :experiment, :title, :memory_bytes, :disk_bytes,
         'queued', :priority, (SELECT COALESCE(MAX(position), 0) + 1 FROM jobs), :now_s)
 """
+
+_MOST = 1 << 62
 
 
 class Ledger:
@@ -75,16 +78,18 @@ class Ledger:
         """Queue all jobs or none, in the order given."""
         keys = [None] * len(specs) if keys is None else keys
         rows = [_row_of(spec, key, group) for spec, key in zip(specs, keys, strict=True)]
-        for row in rows:
-            self._make_folder(row)
         try:
+            for row in rows:
+                self._make_folder(row)
             with self.store.transaction() as database:
                 for row in rows:
                     database.execute(_INSERT, row)
                     log_event(database, row["id"], 0, "state", {"state": JobState.queued})
-        except sqlite3.IntegrityError as error:
+        except Exception as error:
             for row in rows:
                 shutil.rmtree(self.folder / row["id"], ignore_errors=True)
+            if not isinstance(error, sqlite3.IntegrityError):
+                raise
             raise JobError(
                 f"The jobs were not queued: {error}. A submission key or a group is not what it should be; "
                 "use a fresh key, and create the group first."
@@ -140,32 +145,23 @@ class Ledger:
 
     def cancel(self, job: str) -> Job:
         """Stop the job: it keeps its checkpoint and may be retried. Raises JobError when it has ended."""
-        waiting = (JobState.queued, JobState.lost, JobState.paused)
-        with self.store.transaction() as database:
-            ask(database, job, Request("cancel", waiting, JobState.cancelled, JobState.cancelling))
-        return self.get(job)
+        return self._ask(job, JobEvent.cancel)
 
     def pause(self, job: str) -> Job:
         """Stop the job at a checkpoint until `resume`."""
-        waiting = (JobState.queued, JobState.lost)
-        with self.store.transaction() as database:
-            ask(database, job, Request("pause", waiting, JobState.paused, JobState.pausing))
-        return self.get(job)
+        return self._ask(job, JobEvent.pause)
 
     def resume(self, job: str) -> Job:
         """Queue a paused job again; it goes on from its checkpoint."""
-        with self.store.transaction() as database:
-            requeue(database, job, (JobState.paused,), "resume")
-        return self.get(job)
+        return self._ask(job, JobEvent.resume)
 
     def retry(self, job: str) -> Job:
         """Queue a failed, cancelled or lost job again; it goes on from its checkpoint."""
-        with self.store.transaction() as database:
-            requeue(database, job, (JobState.failed, JobState.cancelled, JobState.lost), "retry")
-        return self.get(job)
+        return self._ask(job, JobEvent.retry)
 
     def set_priority(self, job: str, priority: int) -> Job:
-        """Higher priorities start first; equal ones in their order."""
+        """Higher priorities start first; equal ones in their order. Raises BadInputError for an extreme one."""
+        _bounded(priority=priority)
         with self.store.transaction() as database:
             state_of(database, job)
             database.execute("UPDATE jobs SET priority = ? WHERE id = ?", (priority, job))
@@ -183,6 +179,11 @@ class Ledger:
         with self.store.transaction() as database:
             return log_event(database, job, 0, kind, body)
 
+    def _ask(self, job: str, event: JobEvent) -> Job:
+        with self.store.transaction() as database:
+            ask(database, job, event)
+        return self.get(job)
+
     def _submitted_as(self, key: str | None) -> Job | None:
         rows = self.store.rows("SELECT * FROM jobs WHERE submit_key = ?", (key,)) if key else []
         return job_of(rows[0]) if rows else None
@@ -198,6 +199,7 @@ class Ledger:
 
 def _row_of(spec: JobSpec, key: str | None, group: str | None) -> dict[str, Any]:
     kinds.check(spec.kind, spec.settings, spec.experiment)
+    _bounded(priority=spec.priority, memory_bytes=spec.memory_bytes, disk_bytes=spec.disk_bytes)
     return {
         "id": f"j{secrets.token_hex(6)}",
         "key": key,
@@ -211,3 +213,10 @@ def _row_of(spec: JobSpec, key: str | None, group: str | None) -> dict[str, Any]
         "priority": spec.priority,
         "now_s": time.time(),
     }
+
+
+def _bounded(**numbers: int) -> None:
+    """Raise BadInputError for a number that no column of the ledger holds."""
+    for name, value in numbers.items():
+        if abs(value) > _MOST:
+            raise BadInputError(f"{name} is beyond 2^62, more than the ledger holds. Give a smaller number.")

@@ -51,7 +51,6 @@ class Job:
     step: int
     steps: int
     reason: str
-    retry_at_s: float | None
     submitted_s: float
     started_s: float | None
     finished_s: float | None
@@ -84,9 +83,15 @@ class Group:
 
 
 def job_of(row: sqlite3.Row) -> Job:
-    """Turn a row of `jobs` into a `Job`."""
+    """Turn a row of `jobs` into a `Job`; settings that cannot be read are said in its reason."""
     values = {name: row[name] for name in row.keys() if name in Job.__dataclass_fields__}
-    values["settings"] = json.loads(row["settings"])
+    try:
+        values["settings"] = dict(json.loads(row["settings"]))
+    except (ValueError, TypeError, RecursionError) as error:
+        values["settings"] = {}
+        values["reason"] = (
+            f"{row['reason']} The ledger's row of its settings cannot be read ({error}).".strip()
+        )
     values["experiment"] = Path(row["experiment"]) if row["experiment"] else None
     values["state"] = JobState(row["state"])
     values["group"] = row["group_id"]
@@ -94,12 +99,16 @@ def job_of(row: sqlite3.Row) -> Job:
 
 
 def event_of(row: sqlite3.Row) -> Event:
-    """Turn a row of `events` into an `Event`."""
+    """Turn a row of `events` into an `Event`; a body that cannot be read says so."""
+    try:
+        body = dict(json.loads(row["body"]))
+    except (ValueError, TypeError, RecursionError) as error:
+        body = {"reason": f"This event of the ledger cannot be read ({type(error).__name__})."}
     return Event(
         id=row["id"],
         job=row["job_id"],
         attempt=row["attempt"],
         at_s=row["at_s"],
         kind=row["kind"],
-        body=json.loads(row["body"]),
+        body=body,
     )

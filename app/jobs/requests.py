@@ -3,52 +3,26 @@
 import json
 import sqlite3
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 from app.jobs.errors import JobError, UnknownJobError
-from app.jobs.state import JobState
+from app.jobs.state import JOB, JobEvent, JobState
 
 
-@dataclass(frozen=True)
-class Request:
-    """A wish to stop: granted `now` to a job in one of the `waiting` states, `later` to a running one."""
-
-    word: str
-    waiting: Sequence[JobState]
-    now: JobState
-    later: JobState
-
-
-def ask(database: sqlite3.Connection, job: str, request: Request) -> None:
+def ask(database: sqlite3.Connection, job: str, event: JobEvent) -> None:
     """Carry out a request, or leave it to the supervisor. Raises JobError, UnknownJobError."""
-    state = state_of(database, job)
-    is_upgrade = state is JobState.pausing and request.later is JobState.cancelling
-    if state in request.waiting:
-        sql = "UPDATE jobs SET state = ?, retry_at_s = NULL, finished_s = ?, reason = '' WHERE id = ?"
-        finished_s = time.time() if request.now.is_finished else None
-        database.execute(sql, (request.now, finished_s, job))
-        log_event(database, job, 0, "state", {"state": request.now})
-    elif state is JobState.running or is_upgrade:
-        sql = "UPDATE jobs SET state = ?, stop_asked_s = COALESCE(stop_asked_s, ?) WHERE id = ?"
-        database.execute(sql, (request.later, time.time(), job))
-        log_event(database, job, 0, "state", {"state": request.later})
-    elif state not in (request.now, request.later):
-        raise JobError(f"Job {job} is {state}: there is nothing to {request.word}.")
-
-
-def requeue(database: sqlite3.Connection, job: str, allowed: Sequence[JobState], word: str) -> None:
-    """Put a stopped job back into the queue. Raises JobError, UnknownJobError."""
-    state = state_of(database, job)
-    if state not in allowed:
-        raise JobError(f"Job {job} is {state}; only {', '.join(allowed)} can {word}.")
+    before = state_of(database, job)
+    state = JOB.after(before, event, f"Job {job}")
+    if state is before:
+        return
     sql = (
-        "UPDATE jobs SET state = 'queued', losses = 0, retry_at_s = NULL, stop_asked_s = NULL, "
-        "finished_s = NULL, reason = '' WHERE id = ?"
+        "UPDATE jobs SET state = ?, finished_s = ?, reason = '', "
+        "losses = CASE WHEN ? THEN 0 ELSE losses END WHERE id = ?"
     )
-    database.execute(sql, (job,))
-    log_event(database, job, 0, "state", {"state": JobState.queued})
+    finished_s = time.time() if state.is_finished else None
+    database.execute(sql, (state, finished_s, state is JobState.queued, job))
+    log_event(database, job, 0, "state", {"state": state})
 
 
 def move_before(database: sqlite3.Connection, job: str, other: str | None) -> None:

@@ -16,7 +16,7 @@ from app.files.durable import make_folder, sync
 from app.jobs.errors import LedgerError
 from app.jobs.state import ACTIVE, JobState
 
-SCHEMA = 1
+SCHEMA = 2
 _FULL_BYTES = 1 << 16
 _ACTIVE = ", ".join(f"'{state}'" for state in ACTIVE)
 _STATES = ", ".join(f"'{state}'" for state in JobState)
@@ -50,8 +50,6 @@ CREATE TABLE jobs (
   steps INTEGER NOT NULL DEFAULT 0,
   event_offset INTEGER NOT NULL DEFAULT 0,
   reason TEXT NOT NULL DEFAULT '',
-  retry_at_s REAL,
-  stop_asked_s REAL,
   submitted_s REAL NOT NULL,
   started_s REAL,
   finished_s REAL,
@@ -92,6 +90,11 @@ class Store:
             if found == 0:
                 for statement in filter(str.strip, _TABLES.split(";")):
                     database.execute(statement)
+                database.execute(f"PRAGMA user_version = {SCHEMA}")
+            elif found == 1:
+                # Moments of the wall clock, which may be set back.
+                for column in ("retry_at_s", "stop_asked_s"):
+                    database.execute(f"ALTER TABLE jobs DROP COLUMN {column}")
                 database.execute(f"PRAGMA user_version = {SCHEMA}")
             elif found != SCHEMA:
                 raise LedgerError(
@@ -140,6 +143,8 @@ class Store:
             database = sqlite3.connect(self._path, isolation_level=None, timeout=20.0)
             self._local.database = database
             database.row_factory = sqlite3.Row
+            # A damaged text is shown as it is, not refused with its whole list.
+            database.text_factory = lambda content: content.decode("utf-8", "replace")
             try:
                 for setting in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
                     database.execute(f"PRAGMA {setting}")

@@ -1,5 +1,6 @@
 """Jobs that belong together: the points of a sweep, the members of an ensemble; one summary."""
 
+import contextlib
 import itertools
 import json
 import math
@@ -8,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.errors import BadInputError
+from app.errors import AirlensError, BadInputError
 from app.files.durable import write_json
 from app.jobs import kinds
 from app.jobs.folder import JobFolder
@@ -69,6 +70,9 @@ def submit_sweep(
 
 def submit_ensemble(ledger: Ledger, spec: JobSpec, members: int, title: str = "") -> tuple[Group, list[Job]]:
     """Queue `members` jobs that differ only in their `seed`, counted up from the one that is set."""
+    if not 1 <= members <= MOST_JOBS:
+        raise BadInputError(f"This ensemble has {members} members; 1 to {MOST_JOBS} are possible.")
+    kinds.check(spec.kind, spec.settings, spec.experiment)
     first = int(spec.settings.get("seed", 0))
     axes = {"seed": range(first, first + members)}
     return submit_sweep(ledger, spec, axes, title or f"{members} members of {spec.kind}")
@@ -128,9 +132,11 @@ def _varying(jobs: Sequence[Job]) -> list[str]:
 def _point(ledger: Ledger, job: Job, varying: Sequence[str]) -> Point:
     numbers: dict[str, float] = {}
     if job.state is JobState.done:
-        path = JobFolder(ledger.folder / job.id).target() / "result.json"
-        found = json.loads(path.read_text(encoding="utf-8"))["summary"]
-        numbers = {n: float(v) for n, v in found.items() if isinstance(v, int | float)}
+        # A result that was deleted or damaged since has no numbers; the others have theirs.
+        with contextlib.suppress(OSError, AirlensError, ValueError, KeyError, AttributeError, OverflowError):
+            path = JobFolder(ledger.folder / job.id).target() / "result.json"
+            found = json.loads(path.read_text(encoding="utf-8"))["summary"]
+            numbers = {n: float(v) for n, v in found.items() if isinstance(v, int | float)}
     settings = {name: job.settings.get(name) for name in varying}
     return Point(job=job.id, state=job.state, settings=settings, numbers=numbers)
 

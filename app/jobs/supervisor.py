@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterator
 
+from app.errors import AirlensError
 from app.jobs import worker_status
 from app.jobs.admission import disk_shortage, memory_shortage
 from app.jobs.config import JobsConfig
@@ -18,13 +19,15 @@ from app.jobs.dispatch import Dispatch
 from app.jobs.engines import create_engine
 from app.jobs.engines.engine import Engine
 from app.jobs.engines.local import LocalEngine
-from app.jobs.errors import EngineError, JobError, LedgerError
+from app.jobs.errors import EngineError, JobError
 from app.jobs.folder import JobFolder, is_held, try_lock
 from app.jobs.ledger import Ledger
 from app.jobs.records import Job
-from app.jobs.state import JobState
+from app.jobs.state import JobEvent, JobState
 from app.jobs.study import MOST_JOBS, keep_summary
-from app.jobs.watch import Watch, launch_of
+from app.jobs.troubles import FULL, Troubles
+from app.jobs.waiting import SUPERVISOR_LOCK
+from app.jobs.watch import Watch, launch_of, pause_after
 
 _log = logging.getLogger(__name__)
 
@@ -38,6 +41,8 @@ class Supervisor:
         self._engine = create_engine(config, ledger.folder) if engine is None else engine
         self._dispatch = Dispatch(ledger)
         self._watch = Watch(self._dispatch, self._engine, config, ledger.folder)
+        self._troubles = Troubles(self._dispatch, config.start_limit_s, self._kill)
+        self._due_s: dict[tuple[str, int], float] = {}
 
     def run(self, stop: threading.Event) -> None:
         """Work until `stop` is set; running jobs go on and are adopted by the next supervisor.
@@ -48,20 +53,35 @@ class Supervisor:
             self._engine.probe()
             while not stop.is_set():
                 try:
-                    self.round()
-                except (LedgerError, OSError) as error:
-                    # A full disk, most likely: nothing was half done, so the next round goes on.
-                    _log.error("%s", error)
-                    stop.wait(10 * self._config.poll_s)
-                stop.wait(self._config.poll_s)
+                    trouble = self.round()
+                except Exception as error:
+                    # The ledger on a full disk, most likely: nothing was half done, the next round goes on.
+                    trouble = str(error)
+                    _log.error("%s", error, exc_info=not isinstance(error, AirlensError | OSError))
+                stop.wait((10 if trouble else 1) * self._config.poll_s)
 
-    def round(self) -> None:
-        """Look at every active job once, then start what fits."""
-        for job in filter(self._has_folder, self._dispatch.active()):
+    def round(self) -> str:
+        """Look at every active job once, then start what fits; return the trouble that was met, if any.
+
+        Each job is looked at alone: whatever it raises, the others have their turn.
+        """
+        self._troubles.met = ""
+        for job in self._dispatch.active():
+            self._troubles.alone(job, self._look_at)
+        self._fill()
+        return self._troubles.met
+
+    def _look_at(self, job: Job) -> bool:
+        if self._has_folder(job):
+            if job.reason:
+                self._dispatch.explain(job, "")  # a trouble that has passed
             self._watch.judge(job)
             if job.group and not self._ledger.get(job.id).state.is_active:
                 self._sum_up(job.group)
-        self._fill()
+        return True
+
+    def _kill(self, job: Job) -> None:
+        self._watch.kill(job, JobFolder(self._ledger.folder / job.id))
 
     def _sum_up(self, group: str) -> None:
         """Keep the summary of a group whose last job has ended."""
@@ -74,12 +94,12 @@ class Supervisor:
         if (folder / "job.json").is_file():
             return True
         reason = f"Its folder {folder} is gone. Restore it from a copy and `retry`, or submit it again."
-        self._dispatch.conclude(job, JobState.failed, reason)
+        self._dispatch.move(job, JobEvent.fail, reason)
         return False
 
     @contextlib.contextmanager
     def _only_one(self) -> Iterator[None]:
-        lock = try_lock(self._ledger.folder / "supervisor.lock")
+        lock = try_lock(self._ledger.folder / SUPERVISOR_LOCK, wait_s=1.0)
         if lock is None:
             raise JobError(
                 f"Another supervisor already runs the jobs in {self._ledger.folder}. "
@@ -91,13 +111,31 @@ class Supervisor:
     def _fill(self) -> None:
         taken = {job.device for job in self._dispatch.active()}
         free = [device for device in self._config.devices if device not in taken]
-        for job in filter(self._has_folder, self._dispatch.next_waiting(time.time())):
+        waiting = self._dispatch.waiting()
+        known = {(job.id, job.attempt) for job in waiting}
+        self._due_s = {seen: due_s for seen, due_s in self._due_s.items() if seen in known}
+        for job in filter(self._is_due, waiting):
             if not free:
                 return
-            lack = self._lack_of(job)
-            self._dispatch.explain_wait(job, lack)
-            if not lack and self._start(job, free[0]):
+            if self._troubles.alone(job, lambda job: self._try(job, free[0])):
                 free.pop(0)
+
+    def _is_due(self, job: Job) -> bool:
+        """True when a lost job's pause is over, measured from when this supervisor first saw it lost."""
+        if job.state is not JobState.lost:
+            return True
+        seen = (job.id, job.attempt)
+        due_s = self._due_s.setdefault(seen, time.monotonic() + pause_after(job.losses, self._config))
+        return time.monotonic() >= due_s
+
+    def _try(self, job: Job, device: str) -> bool:
+        """Start the job unless something is lacking; return whether it has taken the device."""
+        if not self._has_folder(job):
+            return False
+        lack = self._lack_of(job)
+        if lack or job.state is JobState.queued:
+            self._dispatch.explain(job, lack)
+        return not lack and self._start(job, device)
 
     def _lack_of(self, job: Job) -> str:
         """Return why the job cannot start now, or an empty string."""
@@ -125,11 +163,13 @@ class Supervisor:
             folder.hand_over(owner)
             if folder.is_published():
                 # The attempt before got there after it was given up, and before the fence closed.
-                self._dispatch.conclude(begun, JobState.done)
+                self._dispatch.move(begun, JobEvent.finish)
                 return False
             handle = self._engine.start(launch_of(begun, self._ledger.folder, self._config))
-        except (EngineError, TimeoutError) as error:
-            self._watch.part(begun, worker_status.VANISHED, str(error))
+        except (EngineError, OSError) as error:
+            full = isinstance(error, OSError) and error.errno in FULL
+            status = worker_status.NO_SPACE if full else worker_status.VANISHED
+            self._watch.part(begun, status, f"{error}.")
             return False
         self._dispatch.record_handle(job.id, owner.attempt, handle)
         return True

@@ -11,7 +11,7 @@ from app.api.services import Given, Services
 from app.api.wire.bodies import body
 from app.api.wire.identifier import Identifier
 from app.api.wire.volumes import pack
-from app.jobs import Job, JobSpec, JobState, kinds
+from app.jobs import Job, JobSpec, JobState, explained, kinds
 from app.jobs.attempt import PLANE_FILE
 from app.jobs.folder import JobFolder
 
@@ -33,7 +33,7 @@ def list_jobs(
 ) -> list[JobResource]:
     """List jobs: the running first, then the waiting in their order, then the ended, newest first."""
     states = None if state is None else [JobState(state)]
-    return [resource(job) for job in given.ledger.jobs(states=states, limit=limit)]
+    return [_resource(job) for job in explained(given.ledger, given.ledger.jobs(states=states, limit=limit))]
 
 
 @router.post("/jobs", status_code=201)
@@ -46,13 +46,13 @@ def submit_job(given: Given, new: NewJob) -> JobResource:
         title=new.title,
         priority=new.priority,
     )
-    return resource(given.ledger.submit(spec, key=new.key, group=new.group))
+    return resource(given, given.ledger.submit(spec, key=new.key, group=new.group))
 
 
 @router.get("/jobs/{job}")
 def read_job(given: Given, job: Identifier) -> JobResource:
     """Return one job."""
-    return resource(given.ledger.get(job))
+    return resource(given, given.ledger.get(job))
 
 
 @router.patch("/jobs/{job}")
@@ -62,7 +62,7 @@ def change_job(given: Given, job: Identifier, change: JobChange) -> JobResource:
         given.ledger.set_priority(job, change.priority)
     if change.before is not None or change.priority is None:
         given.ledger.move_before(job, change.before)
-    return resource(given.ledger.get(job))
+    return resource(given, given.ledger.get(job))
 
 
 @router.post("/jobs/{job}/{action}")
@@ -70,7 +70,7 @@ def act_on_job(
     given: Given, job: Identifier, action: Literal["cancel", "pause", "resume", "retry"]
 ) -> JobResource:
     """Cancel (keeps the checkpoint), pause, resume, or retry (goes on from the checkpoint)."""
-    return resource(_action(given, action)(job))
+    return resource(given, _action(given, action)(job))
 
 
 @router.get("/jobs/{job}/curves")
@@ -96,8 +96,12 @@ def read_field(given: Given, job: Identifier) -> Response:
     return Response(packed.content, media_type="application/octet-stream", headers=packed.headers)
 
 
-def resource(job: Job) -> JobResource:
-    """Return what the API shows of a job."""
+def resource(given: Services, job: Job) -> JobResource:
+    """Return what the API shows of a job, with why it waits."""
+    return _resource(explained(given.ledger, [job])[0])
+
+
+def _resource(job: Job) -> JobResource:
     return JobResource(
         job=job.id,
         number=job.number,

@@ -9,6 +9,7 @@ from pathlib import Path
 import psutil
 
 from app.jobs.engines.engine import Launch, ProcessState
+from app.jobs.engines.process import started
 from app.jobs.errors import EngineError
 from app.jobs.folder import JobFolder, read_json
 
@@ -50,12 +51,15 @@ class LocalEngine:
                 f"The worker could not be started: {error}. Free memory or disk space."
             ) from error
         self._children.add(pid)
-        return f"{pid}:{_created_s(pid)}"
+        return f"{pid}:{started(pid)}"
 
     def find(self, launch: Launch) -> str | None:
         """Return the handle that the worker left in its folder."""
-        content = read_json(JobFolder(launch.folder).attempt(launch.attempt) / "worker.json")
-        return f"{content['pid']}:{content['created_s']}" if content else None
+        try:
+            content = read_json(JobFolder(launch.folder).attempt(launch.attempt) / "worker.json")
+            return f"{content['pid']}:{content['started']}" if content else None
+        except (ValueError, KeyError, TypeError):
+            return None  # a damaged file names no process
 
     def state(self, handle: str) -> ProcessState:
         """Say whether that very process lives; another one with the same number does not count."""
@@ -108,17 +112,10 @@ def _environment(device: str, cache: Path) -> dict[str, str]:
 
 
 def _process(handle: str) -> psutil.Process | None:
-    pid, _, created_s = handle.partition(":")
+    pid, _, began = handle.partition(":")
     try:
         process = psutil.Process(int(pid))
-        is_same = abs(process.create_time() - float(created_s)) < 1.0
+        is_same = started(process.pid) == began
         return process if is_same and process.status() != psutil.STATUS_ZOMBIE else None
     except psutil.NoSuchProcess:
         return None
-
-
-def _created_s(pid: int) -> float:
-    try:
-        return psutil.Process(pid).create_time()
-    except psutil.NoSuchProcess:
-        return 0.0

@@ -24,14 +24,14 @@ EXPERIMENT = False
 class NoiseStudy(Strict):
     """`electrons` is the signal at full scale; a frame is the mean of `frames` exposures."""
 
-    electrons: float = Field(default=10000.0, gt=0)
-    read_noise_electrons: float = Field(default=3.0, ge=0)
-    frames: int = Field(default=1, ge=1)
+    electrons: float = Field(default=10000.0, gt=0, le=1e9)
+    read_noise_electrons: float = Field(default=3.0, ge=0, le=1e6)
+    frames: int = Field(default=1, ge=1, le=1_000_000)
     shift_px: float = Field(default=0.05, ge=-1, le=1)
-    window_px: int = Field(default=16, ge=4)
+    window_px: int = Field(default=16, ge=4, le=2048)
     size_px: int = Field(default=128, ge=32, le=2048)
-    trials: int = Field(default=200, ge=1)
-    seed: int = Field(default=0, ge=0)
+    trials: int = Field(default=200, ge=1, le=10_000_000)
+    seed: int = Field(default=0, ge=0, le=(1 << 53) - 1)
 
     @model_validator(mode="after")
     def _whole_windows(self) -> Self:

@@ -65,7 +65,7 @@ def test_a_waiting_job_pauses_resumes_cancels_and_is_retried_at_once(tmp_path: P
     assert ledger.cancel(job).state is JobState.cancelled
     assert ledger.cancel(job).state is JobState.cancelled
     assert ledger.retry(job).state is JobState.queued
-    with pytest.raises(JobError, match="only paused can resume"):
+    with pytest.raises(JobError, match="is queued: there is nothing to resume"):
         ledger.resume(job)
 
 

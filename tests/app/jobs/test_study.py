@@ -10,6 +10,7 @@ from app.errors import BadInputError
 from app.jobs import JobSpec, JobState, Ledger, submit_ensemble, submit_sweep, summarise
 from app.jobs.dispatch import Dispatch
 from app.jobs.folder import JobFolder
+from app.jobs.state import JobEvent
 from app.jobs.study import keep_summary
 
 SMALL = {"trials": 8, "size_px": 64}
@@ -23,7 +24,7 @@ def run_all(ledger: Ledger) -> None:
         folder = JobFolder(ledger.folder_of(job.id))
         folder.hand_over(owner)
         worker.compute(folder, owner, threading.Event())
-        dispatch.conclude(ledger.get(job.id), JobState.done)
+        dispatch.move(ledger.get(job.id), JobEvent.finish)
 
 
 def test_more_light_means_less_noise_and_the_summary_shows_it(tmp_path: Path):
