@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Shaped
 
-from calibration.registration import Registration, Similarity, register
+from calibration.registration import FiniteSimilarity, Registration, register
 
 # A sector this many times beyond its noise says that air moved in the border.
 _SUSPICIOUS = 6.0
@@ -21,7 +21,7 @@ class Drift:
 
     total: Registration
     camera: Registration | None
-    projector: Similarity | None
+    projector: FiniteSimilarity | None
     advice: tuple[str, ...]
 
 
@@ -42,13 +42,13 @@ def measure_drift(
     return Drift(total, camera, projector, _advice(total, camera))
 
 
-def _after(camera: Similarity, total: Similarity) -> Similarity:
+def _after(camera: FiniteSimilarity, total: FiniteSimilarity) -> FiniteSimilarity:
     """The motion that turns the camera's into the total: total = projector o camera."""
     matrix = total.matrix @ np.linalg.inv(camera.matrix)
     scale = float(np.hypot(matrix[0, 0], matrix[1, 0]))
     rotation = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
     centre = total.centre_px
-    return Similarity(matrix[:2, :2] @ centre + matrix[:2, 2] - centre, rotation, scale, centre)
+    return FiniteSimilarity(matrix[:2, :2] @ centre + matrix[:2, 2] - centre, rotation, scale, centre)
 
 
 def _advice(total: Registration, camera: Registration | None) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ _BLURS_PX = (3.0, 0.8)
 
 
 @dataclass(frozen=True)
-class Similarity:
+class FiniteSimilarity:
     """x' = centre + scale R(rotation) (x - centre) + shift: where the picture's content went [px]."""
 
     shift_px: Float[np.ndarray, "2"]
@@ -50,7 +50,7 @@ class Registration:
     `shift_std_px`, something else moved there.
     """
 
-    motion: Similarity
+    motion: FiniteSimilarity
     std: Float[np.ndarray, "4"]
     residual_rms: float
     sector_px: float
@@ -142,8 +142,8 @@ class _Problem:
         x, y = (self._similarity(unknowns).displacement_px(self.at + self.centre) + self.at + self.centre).T
         return ndimage.map_coordinates(self.spline, [y, x], order=3, prefilter=False, mode="mirror")
 
-    def _similarity(self, unknowns: np.ndarray) -> Similarity:
-        return Similarity(unknowns[:2], float(unknowns[2]), float(np.exp(unknowns[3])), self.centre)
+    def _similarity(self, unknowns: np.ndarray) -> FiniteSimilarity:
+        return FiniteSimilarity(unknowns[:2], float(unknowns[2]), float(np.exp(unknowns[3])), self.centre)
 
     def result(self, unknowns: np.ndarray, iterations: int, converged: bool) -> Registration:
         difference = self._sample(unknowns) - self.values

@@ -3,8 +3,8 @@
 World: right-handed, metres, z up. Optics: OpenCV axes (+z forward, +y down).
 """
 
-from dataclasses import replace
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
@@ -14,6 +14,7 @@ from core.setting import SettingError, check_range, setting
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 WallName = Literal["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
+WALLS: tuple[WallName, ...] = get_args(WallName)
 
 
 @setting
@@ -52,9 +53,45 @@ class Box:
         cx, cy, cz = ((u + low) / 2 for low, u in zip(self.lower_m, self.upper_m, strict=True))
         return cx, cy, cz
 
-    def contains(self, point_m: Vector3) -> bool:
-        """Whether the point lies strictly inside."""
-        return all(low < p < u for low, p, u in zip(self.lower_m, point_m, self.upper_m, strict=True))
+
+@dataclass(frozen=True)
+class Face:
+    """A wall as a side of the box: the axis of its normal, and whether it is that axis's upper end."""
+
+    axis: int
+    upper: bool
+
+    @property
+    def number(self) -> int:
+        """Its place in `WALLS`."""
+        return 2 * self.axis + self.upper
+
+    @property
+    def end(self) -> int:
+        """Index of its plane in an array along its axis: 0 or -1."""
+        return -1 if self.upper else 0
+
+    @property
+    def inward(self) -> float:
+        """Sign of a velocity along its axis that enters the room."""
+        return -1.0 if self.upper else 1.0
+
+    @property
+    def along(self) -> tuple[int, int]:
+        """The two axes of the wall, in the order x, y, z."""
+        first, second = (a for a in range(3) if a != self.axis)
+        return first, second
+
+    def place_m(self, box: Box) -> float:
+        """Where the wall stands on its axis."""
+        return (box.upper_m if self.upper else box.lower_m)[self.axis]
+
+
+def face_of(wall: str) -> Face:
+    """The face of a wall by its name. Raises SettingError for a name that is no wall's."""
+    if wall not in WALLS:
+        raise SettingError(f"There is no wall {wall!r}; the walls are {', '.join(WALLS)}.")
+    return Face("xyz".index(wall[0]), wall.endswith("max"))
 
 
 @setting

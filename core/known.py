@@ -1,153 +1,127 @@
-"""What is known of the temperature, put on the vertices of a grid: planes, patches, sensors, one mean.
+"""What a scene says, read in one place: walls, patches, the air that leaves, and how much is known.
 
-The thermal layer at a wall of given temperature is thinner than a cell, so a wall's temperature is not
-the temperature of the air at the grid's wall vertices; it is left to solvers that model the layer.
+Statements that contradict one another are refused here, each with one sentence.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
-from scipy.interpolate import RegularGridInterpolator
 
-from core.geometry import Box, WallName
+from core.geometry import WALLS, WallName, face_of
 from core.problem import PlaneData, Problem
-from core.scene import Heater, Inlet, Outlet, Patch
+from core.scene import Heater, Inlet, Outlet, Patch, Scene, Wall
 from core.setting import SettingError
 
-Volume = Float[np.ndarray, "nx ny nz"]
-
-PLANE_STD_K = 0.05
-
-
-@dataclass(frozen=True)
-class VertexGrid:
-    """Evenly spaced vertices of a box, end planes included."""
-
-    box: Box
-    shape: tuple[int, int, int]
-
-    @property
-    def axes_m(self) -> tuple[Float[np.ndarray, " n"], ...]:
-        """Coordinates along x, y, z."""
-        ends = zip(self.box.lower_m, self.box.upper_m, self.shape, strict=True)
-        return tuple(np.linspace(low, high, n) for low, high, n in ends)
-
-    @property
-    def spacing_m(self) -> tuple[float, ...]:
-        """Distance between vertices along x, y, z."""
-        return tuple(s / (n - 1) for s, n in zip(self.box.size_m, self.shape, strict=True))
+# As `airlens simulate --information` names them; `images`: not even a plane.
+Level = Literal["surveyed", "operator", "paper", "images"]
 
 
-@dataclass(frozen=True)
-class KnownTemperature:
-    """`temperature_k` with `std_k` where `mask`; and means over sets of vertices (flat indices)."""
-
-    mask: Bool[np.ndarray, "nx ny nz"]
-    temperature_k: Volume
-    std_k: Volume
-    means: tuple[tuple[Int[np.ndarray, " members"], float, float], ...]
-
-
-def wall_index(wall: WallName) -> tuple[int, int]:
-    """Axis 0..2 of a wall's normal, and its side: 0 (min) or -1 (max)."""
-    return "xyz".index(wall[0]), 0 if wall.endswith("min") else -1
+def stated_walls(scene: Scene) -> dict[WallName, Wall | None]:
+    """The scene's walls by name; None where nothing is stated. Raises SettingError for a wall stated twice."""
+    walls: dict[WallName, Wall | None] = dict.fromkeys(WALLS)
+    for part in scene.boundary:
+        if isinstance(part, Wall):
+            if walls[part.wall] is not None:
+                times = sum(isinstance(p, Wall) and p.wall == part.wall for p in scene.boundary)
+                raise SettingError(f"The wall {part.wall} is described {times} times; describe it once.")
+            walls[part.wall] = part
+    return walls
 
 
-def on_wall(wall: WallName, values: np.ndarray) -> np.ndarray:
-    """A writable view of the wall's plane of a volume."""
-    axis, side = wall_index(wall)
-    return np.moveaxis(values, axis, 0)[side]
+def unknown_walls(scene: Scene) -> list[WallName]:
+    """Walls of which nobody stated what heat passes them."""
+    walls = stated_walls(scene)
+    return [name for name, wall in walls.items() if wall is None or wall.thermal == "unknown"]
 
 
-def patch_mask(grid: VertexGrid, patch: Patch) -> Bool[np.ndarray, "first second"]:
-    """Which vertices of the wall lie in the patch; the nearest one when none does."""
-    axis, _ = wall_index(patch.wall)
-    masks = []
-    for other, low, high in zip(
-        [a for a in range(3) if a != axis], patch.lower_m, patch.upper_m, strict=True
-    ):
-        coordinates = grid.axes_m[other]
-        tolerance = 1e-6 * (coordinates[-1] - coordinates[0])
-        inside = (coordinates >= low - tolerance) & (coordinates <= high + tolerance)
-        if not inside.any():
-            inside[np.abs(coordinates - (low + high) / 2).argmin()] = True
-        masks.append(inside)
-    return masks[0][:, None] & masks[1][None]
+def level_of(problem: Problem) -> Level:
+    """How much is known: what drives the air and all walls, what drives the air, a plane, or images alone."""
+    if any(isinstance(part, Inlet | Heater) for part in problem.scene.boundary):
+        return "operator" if unknown_walls(problem.scene) else "surveyed"
+    return "paper" if problem.planes else "images"
 
 
-def plane_on_grid(grid: VertexGrid, plane: PlaneData, values: np.ndarray) -> np.ndarray:
-    """A plane's values at the grid's vertices on that wall (bilinear; the nearest edge outside)."""
-    axis, _ = wall_index(plane.wall)  # type: ignore[arg-type]
-    own = (plane.first_m, plane.second_m)
-    targets = [
-        np.clip(grid.axes_m[other], line[0], line[-1])
-        for other, line in zip([a for a in range(3) if a != axis], own, strict=True)
+def measured_outlets(scene: Scene) -> list[tuple[int, Outlet, float]]:
+    """Outlets whose mean temperature is measured: place among the scene's outlets, outlet, and kelvin."""
+    outlets = [part for part in scene.boundary if isinstance(part, Outlet)]
+    return [
+        (n, outlet, outlet.mean_temperature_k)
+        for n, outlet in enumerate(outlets)
+        if outlet.mean_temperature_k is not None
     ]
-    mesh = np.stack(np.meshgrid(*targets, indexing="ij"), axis=-1)
-    return RegularGridInterpolator(own, np.asarray(values, np.float64))(mesh)
 
 
-def known_temperature(problem: Problem, grid: VertexGrid) -> KnownTemperature:
-    """Gather planes, outlets and sensors.
+def leaving_excess_k(problem: Problem) -> float | None:
+    """Mean temperature of the air that leaves, in excess of ambient; None where nothing tells it.
 
-    Supply air and heaters differ from the room's air beside them by a jet or a boundary layer: taken as
-    the room's temperature at that place they would lift the level of all of it. They serve as a check of
-    the planes, and as the level only where nothing else is known.
-
-    Raises SettingError when two entries contradict each other by more than six standard deviations.
+    By the outlets' thermometers, each weighted with its area as the flow divides; else by a plane's outflow.
     """
-    mask = np.zeros(grid.shape, bool)
-    value, std = np.full(grid.shape, np.nan), np.full(grid.shape, np.nan)
+    ambient_k = problem.scene.air.ambient_temperature_k
+    measured = measured_outlets(problem.scene)
+    if measured:
+        areas = np.array([outlet.patch.area_m2 for _, outlet, _ in measured])
+        return float(np.dot(areas / areas.sum(), [kelvin - ambient_k for *_, kelvin in measured]))
     for plane in problem.planes:
-        wall: WallName = plane.wall  # type: ignore[assignment]
-        # The plane's rim lies in the thermal layers of the four neighbouring walls.
-        on_wall(wall, mask)[1:-1, 1:-1] = True
-        on_wall(wall, value)[...] = plane_on_grid(grid, plane, plane.temperature_k)
-        on_wall(wall, std)[...] = PLANE_STD_K
-    means = []
-    for known in problem.scene.boundary:
-        if isinstance(known, Inlet | Heater):
-            inside = patch_mask(grid, known.patch)
-            _check_agreement(on_wall(known.patch.wall, value)[inside], known)
-        elif isinstance(known, Outlet) and known.mean_temperature_k is not None:
-            members = _patch_vertices(grid, known.patch)
-            means.append((members, known.mean_temperature_k, known.temperature_std_k))
-    for sensors in problem.sensors:
-        for position, kelvin, kelvin_std in zip(
-            sensors.position_m, sensors.temperature_k, sensors.temperature_std_k, strict=True
-        ):
-            if np.isfinite(kelvin):
-                means.append((np.array([_nearest(grid, position)]), float(kelvin), float(kelvin_std)))
-    if not mask.any() and not means:
-        # The last resort: supply air is the one temperature that is known.
-        means = [
-            (_patch_vertices(grid, known.patch), known.temperature_k, known.temperature_std_k)
-            for known in problem.scene.boundary
-            if isinstance(known, Inlet)
-        ]
-    return KnownTemperature(mask, value, std, tuple(means))
+        face = face_of(plane.wall)
+        leaving = np.maximum(-face.inward * plane.velocity_m_s[..., face.axis], 0.0)
+        if leaving.sum() > 0:
+            return float((leaving * (plane.temperature_k - ambient_k)).sum() / leaving.sum())
+    return None
 
 
-def _patch_vertices(grid: VertexGrid, patch: Patch) -> Int[np.ndarray, " members"]:
-    everything = np.arange(int(np.prod(grid.shape))).reshape(grid.shape)
-    return on_wall(patch.wall, everything)[patch_mask(grid, patch)]
+def share_area(one: Patch, other: Patch) -> bool:
+    """Whether two patches lie over one another."""
+    shared = [
+        min(h1, h2) - max(l1, l2)
+        for l1, h1, l2, h2 in zip(one.lower_m, one.upper_m, other.lower_m, other.upper_m, strict=True)
+    ]
+    return one.wall == other.wall and min(shared) > 1e-9
 
 
-def _nearest(grid: VertexGrid, position_m: Float[np.ndarray, "3"]) -> int:
-    index = [int(np.abs(axis - p).argmin()) for axis, p in zip(grid.axes_m, position_m, strict=True)]
-    return int(np.ravel_multi_index(index, grid.shape))
+def refuse_overlaps(parts: Sequence[Inlet | Outlet | Heater]) -> None:
+    """Raise SettingError if two of these share area on a wall."""
+    for one, other in combinations(parts, 2):
+        if share_area(one.patch, other.patch):
+            raise SettingError(
+                f"The {one.kind} and the {other.kind} on {one.patch.wall} overlap ({one.patch.lower_m} to "
+                f"{one.patch.upper_m} m and {other.patch.lower_m} to {other.patch.upper_m} m): they contradict "
+                "each other. Move one: a place on a wall is an inlet, an outlet or a heater."
+            )
 
 
-def _check_agreement(given_k: np.ndarray, known: Inlet | Heater) -> None:
-    """The middle of a patch must agree with the plane: its edges are smeared over a cell."""
-    if given_k.size == 0 or not np.isfinite(given_k).all():
-        return
-    difference = float(np.median(given_k)) - known.temperature_k
-    allowed = max(6 * known.temperature_std_k, 1.0)
-    if abs(difference) > allowed:
+def refuse_outward(inlet: Inlet) -> None:
+    """Raise SettingError if the supply does not point into the room."""
+    face = face_of(inlet.patch.wall)
+    if face.inward * inlet.velocity_m_s[face.axis] <= 0:
         raise SettingError(
-            f"The {known.kind} on {known.patch.wall} is given {known.temperature_k:.2f} K, but the plane "
-            f"field has {known.temperature_k + difference:.2f} K there; they differ by more than "
-            f"{allowed:.2f} K. Correct the one that is wrong."
+            f"The inlet on {inlet.patch.wall} supplies air at {inlet.velocity_m_s} m/s, which does not "
+            f"enter the room. Give a velocity with {'xyz'[face.axis]} {'> 0' if face.inward > 0 else '< 0'}, "
+            "or make the patch an outlet."
+        )
+
+
+def refuse_contradicted(part: Inlet | Heater, plane: PlaneData, ambient_k: float) -> None:
+    """Raise SettingError if a plane measured another temperature in the middle half of the patch.
+
+    The plane's edges are smeared, and an entry may be wrong: a quarter of its contrast and 1 K are let pass.
+    """
+    if part.patch.wall != plane.wall:
+        return
+    inside = []
+    for axis_m, low, high in zip(
+        (plane.first_m, plane.second_m), part.patch.lower_m, part.patch.upper_m, strict=True
+    ):
+        quarter = (high - low) / 4
+        inside.append((axis_m > low + quarter) & (axis_m < high - quarter))
+    found = plane.temperature_k[np.ix_(*inside)]
+    if found.size == 0:
+        return
+    measured_k = float(np.median(found))
+    if abs(measured_k - part.temperature_k) > 1.0 + 0.25 * abs(part.temperature_k - ambient_k):
+        raise SettingError(
+            f"The {part.kind} on {plane.wall} is stated at {part.temperature_k:g} K, and the plane {plane.wall} "
+            f"has {measured_k:g} K in it: they contradict each other. Correct the one that is wrong, or leave "
+            "it out."
         )

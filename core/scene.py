@@ -142,6 +142,11 @@ class Patch:
             )
 
     @property
+    def area_m2(self) -> float:
+        """Area of the rectangle."""
+        return (self.upper_m[0] - self.lower_m[0]) * (self.upper_m[1] - self.lower_m[1])
+
+    @property
     def hydraulic_diameter_m(self) -> float:
         """Four times the area over the circumference."""
         one_m, other_m = (high - low for low, high in zip(self.lower_m, self.upper_m, strict=True))

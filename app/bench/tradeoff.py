@@ -22,8 +22,8 @@ from app.volume.measurement import synthetic_problem
 from app.volume.scene import RigOptions
 from app.volume.score import score_solution
 from core.estimate.forward_runs import RoomSettings
+from core.known import level_of
 from core.metrics import departure, inner, rms
-from core.plan.cost import level_of
 from core.problem import Problem
 from core.result import Solution
 from core.setting import SettingError

@@ -8,11 +8,10 @@ import numpy as np
 
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
-from core.geometry import Box
+from core.geometry import Box, face_of
 from core.problem import PlaneData, SensorData
 from core.scene import PlaneField, PointSensors, Scene
 
-_PLANE_AXES = {"x": "yz", "y": "xz", "z": "xy"}
 _SENSOR_COLUMNS = ("x", "y", "z", "T", "T_std", "u", "v", "w", "u_std")
 
 
@@ -38,7 +37,7 @@ def read_sensors(experiment: Experiment, scene: Scene) -> tuple[SensorData, ...]
 
 def read_plane(path: Path, wall: str) -> PlaneData:
     """A plane field: the wall's two axes, T, p and u on them. Raises BadInputError."""
-    first, second = _PLANE_AXES[wall[0]]
+    first, second = ("xyz"[axis] for axis in face_of(wall).along)
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: np.asarray(file[name], np.float64) for name in (first, second, "T", "p", "u")}
@@ -117,8 +116,7 @@ def _check_kelvin(path: Path, temperature_k: np.ndarray) -> None:
 
 def _check_in_room(path: Path, plane: PlaneData, room: Box) -> None:
     """A plane reaches a tenth of the room beyond its wall at most: more is another unit or another room."""
-    axes = [a for a in range(3) if a != "xyz".index(plane.wall[0])]
-    for axis, line in zip(axes, (plane.first_m, plane.second_m), strict=True):
+    for axis, line in zip(face_of(plane.wall).along, (plane.first_m, plane.second_m), strict=True):
         slack_m = 0.1 * room.size_m[axis]
         if line[0] < room.lower_m[axis] - slack_m or line[-1] > room.upper_m[axis] + slack_m:
             raise BadInputError(

@@ -16,10 +16,11 @@ from app.plan.tradeoff import ExpectedError, expected_error
 from app.reconstruct.measure import Measurement, with_calibration
 from app.reconstruct.presets import REFERENCE, STANDARD
 from core.displacement import resolve_window_px
+from core.known import level_of
 from core.metrics import departure, inner, rms
 from core.plan.choice import Choice
 from core.plan.choices import Resolution, resolve
-from core.plan.cost import Speed, Work, draft_work, grid_work, level_of, paper_work, room_work
+from core.plan.cost import Speed, Work, draft_work, grid_work, paper_work, room_work
 from core.plan.expected import ExpectedFlow, expected_flow
 from core.plan.measured import resolve_measured
 from core.plan.observability import seen

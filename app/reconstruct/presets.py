@@ -2,13 +2,13 @@
 
 import inspect
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, get_args
+from typing import Any, Protocol
 
 from app.errors import BadInputError
-from core.geometry import WallName
+from core.known import level_of
 from core.problem import Problem
 from core.result import Solution
-from core.scene import Heater, Inlet, Scene, Wall
+from core.scene import Scene
 from core.solve.draft.draft import solve_draft
 from core.solve.recipes import solve_grid_recipe, solve_paper
 from core.solve.room import RoomSettings, solve_room
@@ -52,9 +52,7 @@ def resolved(name: str, scene: Scene) -> str:
     """`auto` is `standard` where something that drives the air and all walls are stated, else `draft`."""
     if name != "auto":
         return name
-    driven = any(isinstance(part, Inlet | Heater) for part in scene.boundary)
-    known = {p.wall for p in scene.boundary if isinstance(p, Wall) and p.thermal != "unknown"}
-    return "standard" if driven and known == set(get_args(WallName)) else "draft"
+    return "standard" if level_of(Problem(scene, ())) == "surveyed" else "draft"
 
 
 def preset(name: str) -> Solve:

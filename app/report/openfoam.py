@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from core.geometry import WALLS
 from core.result import Solution
 
-WALLS = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
+# In the order of `WALLS`.
 _FACES = ("(0 4 7 3)", "(1 2 6 5)", "(0 1 5 4)", "(3 7 6 2)", "(0 3 2 1)", "(4 5 6 7)")
 _FIELDS = {"T": "[0 0 0 1 0 0 0]", "p": "[0 2 -2 0 0 0 0]", "U": "[0 1 -1 0 0 0 0]"}
 

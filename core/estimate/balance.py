@@ -8,29 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from core.estimate.plane_openings import air_planes, still_vertices
+from core.known import leaving_excess_k
 from core.problem import Problem
 from core.room.boundary_conditions import RoomLayout
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
-from core.room.room_grid import WALLS
-from core.scene import Outlet
-
-# 1.6 W/m2K over rho c.
-WALL_HEAT_M_S = NOMINAL_HEAT_M_S
-
-
-def outflow_excess_k(problem: Problem) -> float | None:
-    """Temperature of the leaving air, by an outlet's thermometer or a plane's outflow; None if unknown."""
-    ambient = problem.scene.air.ambient_temperature_k
-    for part in problem.scene.boundary:
-        if isinstance(part, Outlet) and part.mean_temperature_k is not None:
-            return part.mean_temperature_k - ambient
-    for plane in problem.planes:
-        axis = WALLS.index(plane.wall) // 2
-        outward = plane.velocity_m_s[..., axis] * (-1.0 if plane.wall.endswith("min") else 1.0)
-        leaving = np.maximum(outward, 0.0)
-        if leaving.sum() > 0:
-            return float((leaving * (plane.temperature_k - ambient)).sum() / leaving.sum())
-    return None
 
 
 def free_walls_k(
@@ -40,7 +21,7 @@ def free_walls_k(
 
     Without a thermometer in what leaves it is the ambient one; it stays within the supply's contrast.
     """
-    leaving = outflow_excess_k(problem)
+    leaving = leaving_excess_k(problem)
     if leaving is None or not layout.inlets:
         return 0.0, 0.0
     areas = _heated_areas_m2(layout)
@@ -49,8 +30,8 @@ def free_walls_k(
         return 0.0, 0.0
     inside = _room_excess_k(problem, leaving)
     brought = float(np.dot(supply_m3_s(layout), inlet_excess_k - leaving))
-    known = WALL_HEAT_M_S * float(((areas - free) * (inside - wall_excess_k)).sum())
-    apart = (brought - known) / (WALL_HEAT_M_S * float(free.sum()))
+    known = NOMINAL_HEAT_M_S * float(((areas - free) * (inside - wall_excess_k)).sum())
+    apart = (brought - known) / (NOMINAL_HEAT_M_S * float(free.sum()))
     contrast = max(float(np.abs(inlet_excess_k).max()), abs(inside))
     apart = float(np.clip(apart, -contrast, contrast))
     return inside - apart, abs(apart)
@@ -78,7 +59,7 @@ def heat_balance_m_s(
     problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
 ) -> float | None:
     """One heat coefficient for all walls that closes the balance, within a factor of four of the guess; or None."""
-    leaving = outflow_excess_k(problem)
+    leaving = leaving_excess_k(problem)
     areas = _heated_areas_m2(layout)
     if leaving is None or not layout.inlets or layout.heaters or areas.sum() == 0:
         return None
@@ -88,7 +69,7 @@ def heat_balance_m_s(
     # Heat that flows from cold to warm says that something else is missing, not how well walls conduct.
     if not brought * lost > 0:
         return None
-    return float(np.clip(brought / lost, WALL_HEAT_M_S / 4, WALL_HEAT_M_S * 4))
+    return float(np.clip(brought / lost, NOMINAL_HEAT_M_S / 4, NOMINAL_HEAT_M_S * 4))
 
 
 def _room_excess_k(problem: Problem, leaving: float) -> float:

@@ -3,13 +3,12 @@
 import numpy as np
 from jaxtyping import Float
 
-from core.estimate.balance import outflow_excess_k
 from core.estimate.least_squares import Posterior
 from core.estimate.observation import Observations
 from core.estimate.prior import FITTED_AS_ONE, Prior
+from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
-from core.room.openings import stated_walls
 from core.scene import Heater, Inlet
 
 # An entry is contradicted when the fit moves it by this many of its stated deviations, and of its own.
@@ -47,7 +46,7 @@ def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list
     for n, heater in enumerate(heaters):
         by_k = float(fitted.heater_excess_k[n] - prior.mean.heater_excess_k[n])
         if isinstance(heater, SuspectedHeater):
-            said += suspicion(heater, float(fitted.heater_excess_k[n]) - (outflow_excess_k(problem) or 0.0))
+            said += suspicion(heater, float(fitted.heater_excess_k[n]) - (leaving_excess_k(problem) or 0.0))
         elif f"heater_excess_k[{n}]" in believed:
             said.append(
                 f"The measurements say that the heater on {heater.patch.wall} is "
@@ -142,7 +141,7 @@ def undetermined(problem: Problem) -> list[str]:
             "were fitted, and anything else that drives the air is missing. Velocity is not determined by "
             "these measurements: the one given is a guess of the room model. State the walls to use it."
         ]
-    unknown = [name for name, wall in walls.items() if wall is None or wall.thermal == "unknown"]
+    unknown = unknown_walls(problem.scene)
     if unknown:
         alike = (
             " (y_min and y_max as one: the camera looks through both)"

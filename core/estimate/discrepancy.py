@@ -20,7 +20,7 @@ from scipy.linalg import block_diag
 
 from core.estimate.least_squares import spread
 from core.estimate.observation import IMAGES, PLANES, Observations, ShiftBlocks
-from core.room.room_grid import AXES, WALLS
+from core.geometry import face_of
 from core.room.vertices import linear_matrix
 
 # Neighbouring data err together: so many count as one.
@@ -122,13 +122,12 @@ def _outlet_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
     At its wall, which windows do not see, the correction is but the continuation of what is beside it.
     """
     rows = [np.zeros((0, _LATTICE[0] * _LATTICE[1]))]
-    for outlet in data.outlets:
-        patch, wall = outlet.patch, WALLS.index(outlet.patch.wall)
-        box = data.scene.room
-        first, second = (a for a in AXES if a != wall // 2)
+    for _, outlet, _ in data.outlets:
+        patch, face = outlet.patch, face_of(outlet.patch.wall)
+        box, (first, second) = data.scene.room, face.along
         steps = (np.arange(5) + 0.5) / 5
         points = np.zeros((5, 5, 3))
-        points[..., wall // 2] = (box.lower_m, box.upper_m)[wall % 2][wall // 2]
+        points[..., face.axis] = face.place_m(box)
         points[..., first] = (patch.lower_m[0] + steps * (patch.upper_m[0] - patch.lower_m[0]))[:, None]
         points[..., second] = (patch.lower_m[1] + steps * (patch.upper_m[1] - patch.lower_m[1]))[None, :]
         row = _at_points(data, points.reshape(-1, 3)).mean(axis=0).reshape(_LATTICE)

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from core.estimate.balance import outflow_excess_k
 from core.estimate.plane_openings import air_planes, still_vertices
 from core.estimate.prior import WALL_PARAMETERS, Prior
+from core.known import leaving_excess_k
 from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters
 from core.room.forward import Room, room, room_fields
@@ -122,7 +122,7 @@ def first_profile_k(problem: Problem, coarse: Room) -> Float[np.ndarray, " nz"]:
         count = np.maximum(still.sum(0), 1)
         profile = np.where(still, plane.temperature_k - ambient, 0.0).sum(0) / count
         return np.interp(heights, plane.second_m[still.any(0)], profile[still.any(0)])
-    leaving = outflow_excess_k(problem)
+    leaving = leaving_excess_k(problem)
     if leaving is None:
         inlets = [b for b in problem.scene.boundary if isinstance(b, Inlet)]
         leaving = 0.5 * float(np.mean([i.temperature_k - ambient for i in inlets])) if inlets else 0.0
@@ -156,7 +156,7 @@ def march_under(
     )
     held = None if held_k is None else jnp.asarray(held_k, jnp.float32)
     done = march(flow, model, timing, held_k=held, on_window=report)
-    return ForwardRun(parameters, done, room_fields(done.mean, model, vertices))
+    return ForwardRun(parameters, done, room_fields(done.mean, model, where.layout, vertices))
 
 
 def perturbed(

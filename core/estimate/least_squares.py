@@ -12,10 +12,9 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from core.data_error import CORRELATED_DATA
 from core.estimate.observation import IMAGES, PLANES
 
-# Neighbours err together, and errors of grid and closure trust_radius over whole jets: so many data count as one.
-_COHERENT = 12.0
 _STUDENT_NU = 3.0
 LONGEST_STEP = 3.0
 
@@ -92,7 +91,7 @@ def weighted_variance(
         error = spread(residual[own])
         if g != IMAGES or not far:
             error = min(error, spread(grid_difference[own]))
-        total[own] = (variance[own] + error**2) * (_COHERENT if g in (IMAGES, PLANES) else 1.0)
+        total[own] = (variance[own] + error**2) * (CORRELATED_DATA if g in (IMAGES, PLANES) else 1.0)
     return total
 
 

@@ -6,23 +6,23 @@ pooled likewise. Every datum has its own noise; what the grid cannot represent i
 """
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 from scipy.interpolate import RegularGridInterpolator
 
+from core.data_error import PLANE_NOISE_K, WALL_MARGIN
 from core.estimate.plane_openings import still_vertices
-from core.geometry import Box
+from core.geometry import Box, face_of
+from core.known import measured_outlets
 from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.rays.operator import StraightRayOperator, build
-from core.rays.optics import pinhole
-from core.room.room_grid import AXES, WALLS
+from core.rays.visibility import away_from_walls
+from core.room.room_grid import AXES
 from core.room.vertices import RoomFields, linear_matrix
 from core.scene import Outlet, Scene
 
 _BLOCKS_ACROSS = 28
-_WALL_MARGIN = 0.06
 # Groups of `Observations.values` whose neighbouring data err together.
 IMAGES, PLANES = 0, 1
 
@@ -62,7 +62,7 @@ def shift_blocks(
     operator = build(scene, view, measured.centres_px, vertices, float(measured.window_px))
     block_px = _block_px(scene.room, operator, measured)
     cell = np.floor(measured.centres_px / block_px).astype(int)
-    used = _sees_the_middle(scene, view, measured.centres_px)
+    used = away_from_walls(scene, view, measured.centres_px, WALL_MARGIN)
     if not used.any():
         return None
     key = cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1]
@@ -86,47 +86,34 @@ def _block_px(room: Box, operator: StraightRayOperator, measured: ShiftMeasureme
     return max(1.0, np.round(wanted / measured.window_px)) * measured.window_px
 
 
-def _sees_the_middle(scene: Scene, view: int, centres_px: Float[np.ndarray, "windows 2"]) -> np.ndarray:
-    """Windows that see the back wall at least `_WALL_MARGIN` of its size from its edges."""
-    lens = pinhole(scene.views[view].camera)
-    direction = np.asarray(jax.vmap(lens.direction)(jnp.asarray(centres_px, jnp.float32)), float)
-    origin = np.asarray(scene.views[view].camera.position_m)
-    forward = np.where(direction[:, 1] > 1e-6, direction[:, 1], np.inf)
-    reach = (scene.room.upper_m[1] - origin[1]) / forward
-    point = origin + reach[:, None] * direction
-    inside = np.isfinite(forward)
-    for a in (0, 2):
-        margin = _WALL_MARGIN * scene.room.size_m[a]
-        inside &= (point[:, a] > scene.room.lower_m[a] + margin) & (
-            point[:, a] < scene.room.upper_m[a] - margin
-        )
-    return inside
-
-
 class Observations(eqx.Module):
-    """All data of a problem as one vector with a noise variance each; `group` names where each came from."""
+    """All data of a problem as one vector with a noise variance each; `group` names where each came from.
+
+    `outlets` are those with a thermometer, each with its place among the scene's outlets.
+    """
 
     scene: Scene = eqx.field(static=True)
     shifts: tuple[ShiftBlocks, ...]
     planes: tuple[PlaneData, ...]
     sensors: tuple[SensorData, ...]
-    outlets: tuple[Outlet, ...] = eqx.field(static=True)
+    outlets: tuple[tuple[int, Outlet, float], ...] = eqx.field(static=True)
     vertices: tuple[int, int, int] = eqx.field(static=True)
 
     def values(
         self,
     ) -> tuple[Float[np.ndarray, " data"], Float[np.ndarray, " data"], Int[np.ndarray, " data"]]:
-        """Data, variances and groups (0 shifts, 1 planes, 2 sensors' T, 3 sensors' u, 4 outlet)."""
+        """Data, variances and groups (0 shifts, 1 planes, 2 sensors' T, 3 sensors' u, 4 outlets)."""
         parts = [(b.displacement_px.ravel(), b.variance_px2.ravel(), 0) for b in self.shifts]
         ambient = self.scene.air.ambient_temperature_k
-        parts += [(_plane_pool(p, p.temperature_k - ambient, self.scene), 1e-6, 1) for p in self.planes]
+        parts += [
+            (_plane_pool(p, p.temperature_k - ambient, self.scene), PLANE_NOISE_K**2, 1) for p in self.planes
+        ]
         for s in self.sensors:
             t, u = np.isfinite(s.temperature_k), np.isfinite(s.velocity_m_s)
             std = np.broadcast_to(s.velocity_std_m_s[:, None], u.shape)
             parts.append((s.temperature_k[t] - ambient, s.temperature_std_k[t] ** 2, 2))
             parts.append((s.velocity_m_s[u], std[u] ** 2, 3))
-        for o in self.outlets:
-            parts.append((np.array([(o.mean_temperature_k or ambient) - ambient]), o.temperature_std_k**2, 4))
+        parts += [(np.array([k - ambient]), outlet.temperature_std_k**2, 4) for _, outlet, k in self.outlets]
         values = np.concatenate([np.asarray(v, float).ravel() for v, _, _ in parts] or [np.zeros(0)])
         variance = np.concatenate(
             [np.broadcast_to(s, np.shape(v)).ravel() for v, s, _ in parts] or [np.zeros(0)]
@@ -143,7 +130,7 @@ class Observations(eqx.Module):
             t, u = np.isfinite(s.temperature_k), np.isfinite(s.velocity_m_s)
             parts.append(sample(room.excess_k, s.position_m, self.scene.room)[t])
             parts.append(sample(room.velocity_m_s, s.position_m, self.scene.room)[u])
-        parts += [np.array([room.outflow_excess_k]) for _ in self.outlets]
+        parts += [room.outflow_excess_k[n : n + 1] for n, *_ in self.outlets]
         return np.concatenate([np.asarray(p, float).ravel() for p in parts] or [np.zeros(0)])
 
     def plane_values(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " blocks"]:
@@ -157,8 +144,8 @@ class Observations(eqx.Module):
     def _plane_parts(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> list[Float[np.ndarray, " blocks"]]:
         parts = []
         for plane in self.planes:
-            end = 0 if plane.wall.endswith("min") else -1
-            wall = np.take(excess_k, end, axis=WALLS.index(plane.wall) // 2)
+            face = face_of(plane.wall)
+            wall = np.take(excess_k, face.end, axis=face.axis)
             parts.append(_plane_pool(plane, _on_plane(wall, plane, self.scene.room), self.scene))
         return parts
 
@@ -167,13 +154,12 @@ def observations(problem: Problem, vertices: tuple[int, int, int]) -> Observatio
     """Pool a problem's measurements for rooms on `vertices`."""
     scene = problem.scene
     blocks = [shift_blocks(scene, n, shift, vertices) for n, shift in enumerate(problem.shifts)]
-    outlets = [b for b in scene.boundary if isinstance(b, Outlet) and b.mean_temperature_k is not None]
     return Observations(
         scene,
         tuple(b for b in blocks if b is not None),
         problem.planes,
         problem.sensors,
-        tuple(outlets[:1]),
+        tuple(measured_outlets(scene)),
         vertices,
     )
 
@@ -191,7 +177,7 @@ def _on_plane(
     wall: Float[np.ndarray, "first second"], plane: PlaneData, room: Box
 ) -> Float[np.ndarray, "rows cols"]:
     """A wall's vertex values at the plane's own vertices."""
-    first, second = (a for a in AXES if a != WALLS.index(plane.wall) // 2)
+    first, second = face_of(plane.wall).along
     for axis, points, at in ((first, plane.first_m, 0), (second, plane.second_m, 1)):
         nodes = np.linspace(room.lower_m[axis], room.upper_m[axis], wall.shape[at])
         wall = np.moveaxis(np.tensordot(linear_matrix(nodes, points), wall, axes=(1, at)), 0, at)

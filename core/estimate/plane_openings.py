@@ -12,10 +12,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy import ndimage
 
-from core.geometry import Vector2
+from core.geometry import Vector2, face_of
+from core.known import share_area, stated_walls
 from core.problem import PlaneData, Problem
-from core.room.openings import stated_walls
-from core.room.room_grid import WALLS
 from core.scene import Heater, Inlet, Outlet, Patch
 
 # Patches slower than this share of the fastest flow through the plane are not reported from rounding.
@@ -29,7 +28,7 @@ def with_plane_openings(problem: Problem) -> Problem:
     if any(isinstance(b, Inlet | Outlet | Heater) for b in problem.scene.boundary):
         return problem
     found = tuple(opening for plane in problem.planes for opening in plane_openings(plane))
-    if any(_share_area(one.patch, other.patch) for one, other in combinations(found, 2)):
+    if any(share_area(one.patch, other.patch) for one, other in combinations(found, 2)):
         return problem
     kinds = {type(opening) for opening in found}
     if kinds != {Inlet, Outlet}:
@@ -40,8 +39,8 @@ def with_plane_openings(problem: Problem) -> Problem:
 
 def plane_openings(plane: PlaneData) -> list[Inlet | Outlet]:
     """Inlets and outlets of one plane, each with its flow-weighted mean temperature and velocity."""
-    axis = WALLS.index(plane.wall) // 2
-    inward = plane.velocity_m_s[..., axis] * (1.0 if plane.wall.endswith("min") else -1.0)
+    face = face_of(plane.wall)
+    inward = plane.velocity_m_s[..., face.axis] * face.inward
     found: list[Inlet | Outlet] = []
     fastest = float(np.abs(inward).max())
     for sign in (1.0, -1.0):
@@ -58,7 +57,7 @@ def air_planes(problem: Problem) -> list[PlaneData]:
     """Planes of side walls that have the temperature of the air beside them: not those held at their own."""
     walls = stated_walls(problem.scene)
     held = {name for name, wall in walls.items() if wall is not None and wall.thermal == "temperature"}
-    return [plane for plane in problem.planes if plane.wall[0] != "z" and plane.wall not in held]
+    return [plane for plane in problem.planes if face_of(plane.wall).axis != 2 and plane.wall not in held]
 
 
 def still_vertices(plane: PlaneData) -> Bool[np.ndarray, "first second"]:
@@ -68,14 +67,6 @@ def still_vertices(plane: PlaneData) -> Bool[np.ndarray, "first second"]:
     speed = np.abs(plane.velocity_m_s).max(axis=2)
     still = inner & (speed <= _STILL * speed.max())
     return still if still.any() else inner
-
-
-def _share_area(one: Patch, other: Patch) -> bool:
-    shared = [
-        min(h1, h2) - max(l1, l2)
-        for l1, h1, l2, h2 in zip(one.lower_m, one.upper_m, other.lower_m, other.upper_m, strict=True)
-    ]
-    return one.wall == other.wall and min(shared) > 1e-9
 
 
 def _opening(

@@ -95,10 +95,15 @@ def sentences(analysis: Analysis, share: float) -> list[str]:
         *undetermined(analysis.problem),
         *contradictions(analysis.problem, analysis.prior, analysis.posterior),
         *misfit(analysis.data, share),
-        *balances(
-            parameters, inflow, analysis.best.fields.outflow_excess_k, analysis.problem, held_k_m3_s(analysis)
-        ),
+        *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, held_k_m3_s(analysis)),
     ]
+
+
+def outflow_excess_k(analysis: Analysis) -> float:
+    """Mean over the outlets, by area as the flow divides; 0 in a room without any."""
+    areas = np.array([outlet.area_m2 for outlet in analysis.layout.outlets])
+    share = areas / max(float(areas.sum()), 1e-12)
+    return float(np.dot(share, analysis.best.fields.outflow_excess_k))
 
 
 def held_k_m3_s(analysis: Analysis) -> float:

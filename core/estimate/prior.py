@@ -15,16 +15,15 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float
 
 from core.estimate.balance import (
-    WALL_HEAT_M_S,
     free_walls_k,
     heat_balance_m_s,
-    outflow_excess_k,
     supply_m3_s,
 )
+from core.geometry import WALLS
+from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomLayout, RoomParameters, SuspectedHeater
-from core.room.openings import stated_walls
-from core.room.room_grid import WALLS
+from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.scene import Heater, Inlet
 
 # Walls' heat coefficients are right within a factor of two (one sigma 0.6 in the logarithm).
@@ -140,9 +139,9 @@ def room_prior(
     wall_excess = np.array(
         [0.0 if w is None or w.temperature_k is None else w.temperature_k - ambient for w in walls]
     )
-    free = (layout.heated > 0) & (layout.held == 0)
+    free = np.isin(WALLS, unknown_walls(scene))
     balanced = None if free.any() else heat_balance_m_s(problem, layout, excess, wall_excess)
-    heat_m_s = WALL_HEAT_M_S if balanced is None else balanced
+    heat_m_s = NOMINAL_HEAT_M_S if balanced is None else balanced
     own, apart_k = free_walls_k(problem, layout, excess, wall_excess)
     wall_excess = np.where(free, own, wall_excess)
     mean = RoomParameters(
@@ -171,7 +170,7 @@ def room_prior(
         jnp.float32(_SIMPLE_CLOSURE_STD if simple else _CLOSURE_STD),
         jnp.full((3, 3, 4), log_viscosity_std),
     )
-    leaving = None if balanced is None else outflow_excess_k(problem)
+    leaving = None if balanced is None else leaving_excess_k(problem)
     return Prior(mean, std, supply_m3_s(layout), leaving)
 
 

@@ -12,6 +12,7 @@ from core.estimate.discrepancy import Correction, temperature_correction
 from core.estimate.forward_runs import Derivatives, ForwardRun
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior
+from core.geometry import WALLS, Face, face_of
 from core.room.boundary_conditions import RoomLayout
 from core.room.room_grid import AXES
 from core.room.vertices import RoomFields, cell_matrix
@@ -54,13 +55,13 @@ def unheld(
     shift_k = layer_means(held.excess_k) - layer_means(before.excess_k)
     if not prior.unknown_walls():
         shift_k = np.full_like(shift_k, shift_k.mean())
-    outflow_k, box = held.outflow_excess_k, data.scene.room
-    for outlet in data.outlets:
-        patch = outlet.patch
-        ends_m = {"z_min": box.lower_m[2], "z_max": box.upper_m[2]}
-        height_m = ends_m.get(patch.wall, 0.5 * (patch.lower_m[1] + patch.upper_m[1]))
-        heights_m = np.linspace(box.lower_m[2], box.upper_m[2], len(shift_k))
-        outflow_k -= float(np.interp(height_m, heights_m, shift_k))
+    outflow_k, box = held.outflow_excess_k.copy(), data.scene.room
+    heights_m = np.linspace(box.lower_m[2], box.upper_m[2], len(shift_k))
+    for n, outlet, _ in data.outlets:
+        patch, face = outlet.patch, face_of(outlet.patch.wall)
+        middle_m = 0.5 * (patch.lower_m[1] + patch.upper_m[1])
+        height_m = face.place_m(box) if face.axis == 2 else middle_m
+        outflow_k[n] -= float(np.interp(height_m, heights_m, shift_k))
     return RoomFields(held.excess_k - shift_k * free, held.pressure_m2_s2, held.velocity_m_s, outflow_k)
 
 
@@ -83,15 +84,15 @@ def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.n
     """1 where a vertex is not on a wall, or heater, of stated temperature."""
     free = np.ones(shape)
     for wall in np.flatnonzero(layout.held):
-        free[_plane(wall)] = 0.0
+        free[_plane(face_of(WALLS[wall]))] = 0.0
     for heater in (h for h, shown in zip(layout.heaters, layout.shown, strict=True) if shown):
         first, second = (cell_matrix(layout.grid, a, shape[a]) for a in AXES if a != heater.axis)
-        free[_plane(heater.wall)] *= 1.0 - first @ np.pad(heater.fraction, 1) @ second.T
+        free[_plane(face_of(WALLS[heater.wall]))] *= 1.0 - first @ np.pad(heater.fraction, 1) @ second.T
     return free
 
 
-def _plane(wall: int | np.integer) -> tuple[slice | int, ...]:
-    return tuple((-1 if wall % 2 else 0) if a == wall // 2 else slice(None) for a in AXES)
+def _plane(face: Face) -> tuple[slice | int, ...]:
+    return tuple(face.end if a == face.axis else slice(None) for a in AXES)
 
 
 def level_std_k(derivatives: Derivatives) -> float:

@@ -17,16 +17,15 @@ from typing import NamedTuple
 import equinox as eqx
 import numpy as np
 
-from core.estimate.balance import outflow_excess_k
 from core.estimate.forward_runs import Event, RoomSettings, march_under
 from core.estimate.observation import Observations
 from core.estimate.parameter_fit import Background
 from core.estimate.parameter_step import misfit_ratio
 from core.estimate.prior import room_prior
+from core.known import leaving_excess_k, share_area
 from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.room.forward import Room, room
-from core.room.openings import share_area
 from core.scene import Heater, Inlet, Outlet, Patch
 
 _STRIPS, _DEPTH_SHARE = 5, 0.2
@@ -108,7 +107,7 @@ def floor_strips(problem: Problem, *, between: bool = False) -> list[SuspectedHe
     edges_m = np.linspace(box.lower_m[0], box.upper_m[0], _STRIPS + 1)
     edges_m = 0.5 * (edges_m[:-1] + edges_m[1:]) if between else edges_m
     middle_m, half_m = box.centre_m[1], 0.5 * _DEPTH_SHARE * box.size_m[1]
-    air_k = scene.air.ambient_temperature_k + (outflow_excess_k(problem) or 0.0)
+    air_k = scene.air.ambient_temperature_k + (leaving_excess_k(problem) or 0.0)
     taken = [b.patch for b in scene.boundary if isinstance(b, Inlet | Outlet | Heater)]
     strips = []
     for low_m, high_m in pairwise(edges_m):

@@ -8,15 +8,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from core.geometry import WallName
+from core.geometry import WallName, face_of
 from core.grid.interpolation import interpolation_matrix
+from core.known import measured_outlets
 from core.losses.boussinesq import FlowValues
 from core.losses.physics import BoundaryLoss, KnownValues, MeanLoss, PointLoss
 from core.losses.representation import Span, Spans, points_of, positions
 from core.problem import PlaneData, Problem, SensorData
 from core.scene import Heater, Inlet, Outlet, Patch, Wall
 from core.setting import SettingError
-from core.solve.nondimensional import Frame, measured_outlets
+from core.solve.nondimensional import Frame
 
 # A reading that is one standard deviation off weighs this much against the losses, which are means of squares.
 _READING = 0.01
@@ -62,12 +63,12 @@ def point_losses(problem: Problem, frame: Frame) -> tuple[PointLoss, ...]:
 def level_loss(problem: Problem, frame: Frame, points_an_axis: int) -> MeanLoss | None:
     """The outlets' mean temperatures on walls whose plane is not known; None where there are none."""
     known = {plane.wall for plane in problem.planes}
-    outlets = [found for found in measured_outlets(problem) if found[0].patch.wall not in known]
+    outlets = [found for found in measured_outlets(problem.scene) if found[1].patch.wall not in known]
     if not outlets:
         return None
     say = _READING if problem.planes or problem.sensors else _ONLY_READING
     points, target, weight = [], [], []
-    for outlet, kelvin in outlets:
+    for _, outlet, kelvin in outlets:
         spans, axes = _wall_spans(outlet.patch.wall, frame, points_an_axis)
         spans = _inwards(spans, outlet.patch.wall, frame, points_an_axis)
         inside = _inside(outlet.patch, spans, axes, frame).ravel()
@@ -79,8 +80,9 @@ def level_loss(problem: Problem, frame: Frame, points_an_axis: int) -> MeanLoss 
 
 def _inwards(spans: Spans, wall: WallName, frame: Frame, n: int) -> Spans:
     """Half a cell of the grid inside: air that leaves has no layer, and nothing else holds a grid's ghosts."""
-    axis = "xyz".index(wall[0])
-    step = (frame.upper[axis] - frame.lower[axis]) / (n - 1) * (1 if wall.endswith("min") else -1)
+    face = face_of(wall)
+    axis = face.axis
+    step = (frame.upper[axis] - frame.lower[axis]) / (n - 1) * face.inward
     moved = list(spans)
     moved[axis] = (spans[axis][0] + step, spans[axis][0] + step, 1)
     return _triple(moved)
@@ -139,7 +141,7 @@ def _wall(wall: Wall, held: list[Patch], frame: Frame, n: int, *, resolved: bool
 
 def _insulated(wall: WallName, spans: Spans, free: np.ndarray, frame: Frame, n: int) -> KnownValues:
     """No heat through the wall: the temperatures half a spacing inside and outside are equal."""
-    axis = "xyz".index(wall[0])
+    axis = face_of(wall).axis
     step = (frame.upper[axis] - frame.lower[axis]) / (n - 1)  # half a cell on either side: see `solve_grid`
     place = spans[axis][0]
     before, after = list(spans), list(spans)
@@ -197,12 +199,11 @@ def _sensors(sensor: SensorData, frame: Frame) -> PointLoss:
 
 def _wall_spans(wall: str, frame: Frame, n: int) -> tuple[Spans, tuple[int, int]]:
     """The wall's points, and its two axes."""
-    axis = "xyz".index(wall[0])
-    corner = frame.lower if wall.endswith("min") else frame.upper
+    face = face_of(wall)
+    corner = frame.upper if face.upper else frame.lower
     spans: list[Span] = [(low, high, n) for low, high in zip(frame.lower, frame.upper, strict=True)]
-    spans[axis] = (corner[axis], corner[axis], 1)
-    first, second = (a for a in range(3) if a != axis)
-    return _triple(spans), (first, second)
+    spans[face.axis] = (corner[face.axis], corner[face.axis], 1)
+    return _triple(spans), face.along
 
 
 def _triple(spans: list[Span]) -> Spans:

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy import ndimage
 
-from core.losses.shifts import ShiftRows, similarity_basis
+from core.losses.shifts import ShiftRows, drift_basis
 from core.problem import ImagePair
 from core.rays.operator import build
 from core.render.light import pattern_image, sample_pattern
@@ -92,7 +92,7 @@ def _rows(
         build(scene, view, positions, shape),
         jnp.asarray(-gradient[:, None, :] / std, jnp.float32),
         jnp.asarray(difference[:, None] / std, jnp.float32),
-        jnp.asarray(similarity_basis(positions, (camera.width_px, camera.height_px))),
+        jnp.asarray(drift_basis(positions, (camera.width_px, camera.height_px))),
         samples,
     )
 

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from core.air import Air
+from core.displacement import similarity_basis
 from core.losses.boussinesq import Scales
 from core.losses.physics import Rows
 from core.losses.representation import Fields, Spans, Unknowns
@@ -109,12 +110,10 @@ def displacement_rows(
     )
 
 
-def similarity_basis(
+def drift_basis(
     centres_px: Float[np.ndarray, "positions 2"], size_px: tuple[int, int]
 ) -> Float[np.ndarray, "positions 2 4"]:
-    """Displacements of a unit move along columns, along rows, rotation, magnification (see `Unknowns`)."""
+    """`similarity_basis` with rotation and magnification scaled to 1 px at the picture's edge (see `Unknowns`)."""
     half = max(size_px) / 2
-    u, v = ((centres_px - (np.array(size_px) - 1) / 2) / half).T
-    one, zero = np.ones_like(u), np.zeros_like(u)
-    basis = np.stack([np.stack([one, zero, -v, u], -1), np.stack([zero, one, u, v], -1)], axis=1)
-    return basis.astype(np.float32)
+    scale = np.array([1.0, 1.0, half, half])
+    return (similarity_basis(centres_px, (size_px[1], size_px[0])) / scale).astype(np.float32)

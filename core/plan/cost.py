@@ -9,7 +9,6 @@ that information, times the expected flow's own departures.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -18,8 +17,6 @@ from core.estimate.prior import room_prior
 from core.plan.expected import ExpectedFlow
 from core.problem import Problem
 from core.room.forward import closure_name, room
-from core.room.room_grid import WALLS
-from core.scene import Heater, Inlet, Wall
 from core.setting import setting
 from core.solve.draft.draft import draft_grid
 from core.solve.recipes import PAPER_STEPS
@@ -28,9 +25,6 @@ from core.solve.recipes import PAPER_STEPS
 _FREE_PROFILE = 1.5
 # Corrections of a fine room before none gains any more, its walls stated or not.
 _STATED_ROUNDS, _UNKNOWN_ROUNDS = 3, 6
-
-# As `airlens simulate --information` names them; `images`: not even a plane.
-Level = Literal["surveyed", "operator", "paper", "images"]
 
 
 @dataclass(frozen=True)
@@ -88,18 +82,6 @@ def room_work(problem: Problem, flow: ExpectedFlow, settings: RoomSettings) -> W
         cells = float(np.prod(place.grid.cells))
         loops += cells * seconds * steps / min(place.grid.spacing_m)
     return Work(loops, float(np.prod(fine.grid.cells)))
-
-
-def level_of(problem: Problem) -> Level:
-    """How much is known: all walls and what drives the air, some of it, a plane, or the images alone."""
-    boundary = problem.scene.boundary
-    driven = any(isinstance(b, Inlet | Heater) for b in boundary)
-    walls = [b.thermal for b in boundary if isinstance(b, Wall)]
-    if driven and len(walls) == len(WALLS) and "unknown" not in walls:
-        return "surveyed"
-    if driven:
-        return "operator"
-    return "paper" if problem.planes else "images"
 
 
 def grid_work(problem: Problem) -> Work:

@@ -15,9 +15,10 @@ from core.estimate.forward_runs import RoomSettings, run_as_stated
 from core.estimate.plane_openings import with_plane_openings
 from core.estimate.prior import room_prior
 from core.fields import SplineField, plume, through_vertices
-from core.known import VertexGrid
+from core.known_temperature import VertexGrid
 from core.problem import Problem
 from core.room.forward import closure_name, room
+from core.room.march import MarchSettings
 from core.room.step import longest_step_s
 from core.scene import Heater, Inlet, Scene, Wall
 from core.setting import SettingError
@@ -28,7 +29,6 @@ Volume = Float[np.ndarray, "nx ny nz"]
 DEFAULT_EXCESS_K = 10.0
 _COARSE = RoomSettings(coarse_cells=20, settle_s=180.0)
 _VERTICES = 33
-COURANT = 0.45
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def _marched(problem: Problem) -> ExpectedFlow:
     # A coarse march that has not settled may overshoot; air is between what drives it.
     stated = [0.0, *_stated_excesses_k(problem)]
     excess = np.clip(excess, min(stated), max(stated))
-    step_s = float(longest_step_s(done.flow.last, coarse.model(prior.mean), COURANT))
+    step_s = float(longest_step_s(done.flow.last, coarse.model(prior.mean), MarchSettings().courant))
     speed = float(np.sqrt(np.mean(np.sum(np.square(done.fields.velocity_m_s), -1))))
     pressure = done.fields.pressure_m2_s2
     return ExpectedFlow(

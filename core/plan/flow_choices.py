@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from core.air import GRAVITY_M_S2
 from core.plan.choice import Choice
 from core.plan.expected import ExpectedFlow
 from core.scene import Inlet, Scene
@@ -44,7 +45,7 @@ def transport(scene: Scene, flow: ExpectedFlow) -> Choice:
     ]
     contrast = float(np.abs(flow.excess_k).max())
     diffusivity = air.kinematic_viscosity_m2_s / air.prandtl
-    rayleigh = 9.81 * contrast / air.ambient_temperature_k * room.size_m[2] ** 3
+    rayleigh = GRAVITY_M_S2 * contrast / air.ambient_temperature_k * room.size_m[2] ** 3
     rayleigh /= air.kinematic_viscosity_m2_s * diffusivity
     turbulent = max(reynolds, default=0.0) > _LAMINAR_RE or rayleigh > _LAMINAR_RA
     value = ("k_epsilon" if turbulent else "molecular") if given == "auto" else given

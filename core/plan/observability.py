@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from core.known import VertexGrid, known_temperature
+from core.known_temperature import VertexGrid, known_temperature
 from core.plan.expected import ExpectedFlow
 from core.plan.signal import Signal
 from core.problem import Problem

@@ -11,15 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from core.room.openings import (
-    Opening,
-    lay_patch,
-    refuse_outward,
-    refuse_overlaps,
-    stated_walls,
-    supply_turbulence,
-)
-from core.room.room_grid import AXES, WALLS, RoomGrid
+from core.geometry import WALLS
+from core.known import refuse_outward, refuse_overlaps, stated_walls
+from core.room.openings import Opening, lay_patch, supply_turbulence
+from core.room.room_grid import AXES, RoomGrid
 from core.room.wall_planes import Boundary, WallPlane, closed_wall
 from core.scene import Heater, Inlet, Outlet, Scene
 from core.setting import SettingError
@@ -91,13 +86,13 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
             f"Air flows in at {flow} m/s but no outlet is named, so it cannot leave. "
             "Add [[scene.boundary]] with kind = 'outlet' and its patch."
         )
-    refuse_overlaps([b.patch for b in (*inlets, *outlets, *heaters)])
+    refuse_overlaps((*inlets, *outlets, *heaters))
+    for inlet in inlets:
+        refuse_outward(inlet)
     notes: list[str] = []
     place = [
         [lay_patch(b.patch, scene.room, grid, notes) for b in kind] for kind in (inlets, outlets, heaters)
     ]
-    for inlet, opening in zip(inlets, place[0], strict=True):
-        refuse_outward(inlet, opening)
     stated = [walls[name] for name in WALLS]
     heated = np.array([float(wall is None or wall.thermal != "adiabatic") for wall in stated])
     no_slip = np.array([float(wall is None or wall.no_slip) for wall in stated])

@@ -14,7 +14,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from core.room.k_epsilon import KEpsilonState, advance, energy_walls, heat_walls
+from core.air import Air
+from core.room.k_epsilon import C_MU, KEpsilonState, advance, energy_walls, heat_walls
 from core.room.momentum import Viscosity
 from core.room.room_grid import AXES, Cells, RoomGrid, Velocity, face_mean, first_plane, last_plane
 from core.room.wall_planes import Boundary, Plane
@@ -47,11 +48,8 @@ class AbstractClosure(eqx.Module):
         """Factors on the walls' conductances (low, high an axis)."""
 
 
-class ConstantClosure(AbstractClosure):
-    """One eddy viscosity everywhere, on walls too; zero for laminar flow."""
-
-    eddy_m2_s: Float[Array, ""]
-    molecular_m2_s: Float[Array, ""]
+class AbstractAlgebraicClosure(AbstractClosure):
+    """A closure without a state of its own: its viscosity follows from the velocity, its walls are as stated."""
 
     def start(self, grid: RoomGrid, speed_m_s: float) -> KEpsilonState | None:
         """No state."""
@@ -67,37 +65,29 @@ class ConstantClosure(AbstractClosure):
     ) -> KEpsilonState | None:
         """No state."""
         return None
-
-    def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
-        """The constant."""
-        return _same_on_walls(jnp.full(grid.cells, 1.0) * (self.eddy_m2_s + self.molecular_m2_s))
 
     def wall_heat(self, state: KEpsilonState | None, grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
         """The stated conductances."""
         return _even_walls(grid)
 
 
-class ZeroEquationClosure(AbstractClosure):
+class ConstantClosure(AbstractAlgebraicClosure):
+    """One eddy viscosity everywhere, on walls too; zero for laminar flow."""
+
+    eddy_m2_s: Float[Array, ""]
+    molecular_m2_s: Float[Array, ""]
+
+    def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
+        """The constant."""
+        return _same_on_walls(jnp.full(grid.cells, 1.0) * (self.eddy_m2_s + self.molecular_m2_s))
+
+
+class ZeroEquationClosure(AbstractAlgebraicClosure):
     """Chen and Xu (1998): local speed times wall distance; `scale` multiplies their 0.03874."""
 
     wall_distance_m: Cells
     scale: Float[Array, ""]
     molecular_m2_s: Float[Array, ""]
-
-    def start(self, grid: RoomGrid, speed_m_s: float) -> KEpsilonState | None:
-        """No state."""
-        return None
-
-    def advance(
-        self,
-        state: KEpsilonState | None,
-        velocity: Velocity,
-        boundary: Boundary,
-        grid: RoomGrid,
-        dt_s: Float[Array, ""],
-    ) -> KEpsilonState | None:
-        """No state."""
-        return None
 
     def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
         """0.03874 |u| l plus the molecular one."""
@@ -105,21 +95,18 @@ class ZeroEquationClosure(AbstractClosure):
         speed = jnp.sqrt(u**2 + v**2 + w**2)
         return _same_on_walls(0.03874 * self.scale * speed * self.wall_distance_m + self.molecular_m2_s)
 
-    def wall_heat(self, state: KEpsilonState | None, grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
-        """The stated conductances."""
-        return _even_walls(grid)
-
 
 class KEpsilonClosure(AbstractClosure):
     """Standard k-epsilon; `scale` multiplies C_mu's viscosity in the cells."""
 
     scale: Float[Array, ""]
     molecular_m2_s: Float[Array, ""]
+    prandtl: float = eqx.field(static=True, default=Air().prandtl)
 
     def start(self, grid: RoomGrid, speed_m_s: float) -> KEpsilonState | None:
         """k from 10 % of the speed, epsilon so that nu_t is 30 times the molecular viscosity."""
         k = jnp.full(grid.cells, 1.5 * (0.1 * speed_m_s) ** 2, jnp.float32)
-        return KEpsilonState(k, 0.09 * k**2 / (30.0 * self.molecular_m2_s))
+        return KEpsilonState(k, C_MU * k**2 / (30.0 * self.molecular_m2_s))
 
     def advance(
         self,
@@ -145,7 +132,7 @@ class KEpsilonClosure(AbstractClosure):
         """More where the air is stirred."""
         if state is None:
             return _even_walls(grid)
-        return heat_walls(state.energy_m2_s2, grid, self.molecular_m2_s)
+        return heat_walls(state.energy_m2_s2, grid, self.molecular_m2_s, self.prandtl)
 
 
 def wall_distance_m(grid: RoomGrid) -> Cells:

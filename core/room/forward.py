@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from core.air import GRAVITY_M_S2
+from core.geometry import WALLS, Face, face_of
 from core.room.boundary_conditions import RoomLayout, RoomParameters, boundary, room_layout
 from core.room.closure import (
     AbstractClosure,
@@ -28,7 +29,6 @@ from core.scene import Scene
 
 # nu_t = 0.0058 U sqrt(A) is the mean of k-epsilon's over the reference rooms.
 _EDDY_SHARE = 0.0058
-_TURBULENT_PRANDTL = 0.85
 
 
 class Room(eqx.Module):
@@ -60,7 +60,6 @@ class Room(eqx.Module):
             buoyancy_m_s2_k=GRAVITY_M_S2 * air.expansion_per_k,
             molecular_m2_s=air.kinematic_viscosity_m2_s,
             prandtl=air.prandtl,
-            turbulent_prandtl=_TURBULENT_PRANDTL,
         )
         return eqx.tree_at(
             lambda m: m.log_viscosity, bare, lattice_to_cells(parameters.log_viscosity, self.grid)
@@ -85,7 +84,7 @@ class Room(eqx.Module):
             return ConstantClosure(scale * eddy, molecular)
         if self.closure == "molecular":
             return ConstantClosure(0.0 * scale, molecular)
-        return KEpsilonClosure(scale, molecular)
+        return KEpsilonClosure(scale, molecular, self.scene.air.prandtl)
 
 
 def closure_name(scene: Scene) -> str:
@@ -106,7 +105,7 @@ def _plume_speed_m_s(scene: Scene) -> float:
     ambient = scene.air.ambient_temperature_k
     stated = [getattr(part, "temperature_k", None) for part in scene.boundary]
     contrast = max([abs(t - ambient) for t in stated if t is not None] + [0.1])
-    return 0.1 * float(np.sqrt(9.81 * contrast / ambient * scene.room.size_m[2]))
+    return 0.1 * float(np.sqrt(GRAVITY_M_S2 * contrast / ambient * scene.room.size_m[2]))
 
 
 def lattice_to_cells(lattice: Float[Array, "lx ly lz"], grid: RoomGrid) -> Float[Array, "nx ny nz"]:
@@ -137,29 +136,52 @@ def carried_over(flow: Flow, source: RoomGrid, target: RoomGrid) -> Flow:
     return Flow(velocity, cells(flow.excess_k), cells(flow.pressure_m2_s2), turbulence)
 
 
-def room_fields(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> RoomFields:
-    """The flow on the room's vertices."""
-    excess, pressure, velocity, outflow = _vertices(flow, model, vertices)
-    return RoomFields(np.asarray(excess), np.asarray(pressure), np.asarray(velocity), float(outflow))
+def room_fields(
+    flow: Flow, model: RoomModel, layout: RoomLayout, vertices: tuple[int, int, int]
+) -> RoomFields:
+    """The flow on the room's vertices, and what leaves by each outlet."""
+    excess, pressure, velocity = _vertices(flow, model, vertices)
+    leaving = [_outflow_excess_k(flow, model, *of) for of in _outlet_faces(layout)]
+    return RoomFields(
+        np.asarray(excess), np.asarray(pressure), np.asarray(velocity), np.array(leaving, float)
+    )
 
 
 @eqx.filter_jit
-def _vertices(
-    flow: Flow, model: RoomModel, vertices: tuple[int, int, int]
-) -> tuple[Array, Array, Array, Array]:
-    heat, volume = jnp.float32(0.0), jnp.float32(0.0)
-    for a in AXES:
-        for side, wall in enumerate(model.boundary.walls[a]):
-            leaving = jnp.maximum(wall.normal_m_s if side else -wall.normal_m_s, 0.0)
-            beside = jnp.take(flow.excess_k, -1 if side else 0, axis=a)
-            heat, volume = heat + jnp.sum(leaving * beside), volume + jnp.sum(leaving)
-    outflow = heat / jnp.maximum(volume, 1e-12)
+def _vertices(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> tuple[Array, Array, Array]:
     return (
         vertex_excess_k(flow, model, vertices),
         vertex_pressure_m2_s2(flow, model, vertices),
         vertex_velocity_m_s(flow.velocity, model, vertices),
-        outflow,
     )
+
+
+def _outlet_faces(layout: RoomLayout) -> list[tuple[Face, Array, Array]]:
+    """Each outlet's face, its part of what leaves through every cell there, and the share that it covers."""
+    found = []
+    for outlet in layout.outlets:
+        # Two outlets may share a cell's face: each has its part of what leaves there.
+        covered = np.sum([o.fraction for o in layout.outlets if o.wall == outlet.wall], axis=0)
+        part = outlet.fraction / np.where(covered > 0, covered, 1.0)
+        both = (jnp.asarray(values, jnp.float32) for values in (part, outlet.fraction))
+        found.append((face_of(WALLS[outlet.wall]), *both))
+    return found
+
+
+@eqx.filter_jit
+def _outflow_excess_k(
+    flow: Flow,
+    model: RoomModel,
+    face: Face,
+    part: Float[Array, "first second"],
+    area: Float[Array, "first second"],
+) -> Float[Array, ""]:
+    """Flow-weighted mean of the air beside an outlet; by area where no air leaves."""
+    wall = model.boundary.walls[face.axis][face.upper]
+    leaving = part * jnp.maximum(-face.inward * wall.normal_m_s, 0.0)
+    beside = jnp.take(flow.excess_k, face.end, axis=face.axis)
+    by_flow = jnp.sum(leaving * beside) / jnp.maximum(jnp.sum(leaving), 1e-12)
+    return jnp.where(jnp.sum(leaving) > 0, by_flow, jnp.sum(area * beside) / jnp.sum(area))
 
 
 def _apply_matrix(matrix: np.ndarray, field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:

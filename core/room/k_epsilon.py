@@ -30,7 +30,9 @@ from core.room.wall_planes import Boundary
 
 C_MU, C_1, C_2, SIGMA_EPSILON = 0.09, 1.44, 1.92, 1.3
 KAPPA, WALL_E, LAMINAR_Y_PLUS = 0.41, 9.8, 11.53
+# Of free convection along a wall: 1.6 W/m2K over rho c.
 NOMINAL_HEAT_M_S = 1.35e-3
+TURBULENT_PRANDTL = 0.85
 SMALLEST_K, SMALLEST_EPSILON = 1e-9, 1e-12
 
 
@@ -133,14 +135,15 @@ def energy_walls(
 
 
 def heat_walls(
-    k: Cells, grid: RoomGrid, molecular_m2_s: Float[Array, ""]
+    k: Cells, grid: RoomGrid, molecular_m2_s: Float[Array, ""], prandtl: float
 ) -> tuple[tuple[Float[Array, "..."], Float[Array, "..."]], ...]:
     """Heat coefficient of the walls' air relative to free convection's nominal one (low, high an axis).
 
     Jayatilleke's wall function where the air is stirred; where it is not, half of the nominal coefficient or
     conduction through half a cell. A jet that sweeps a wall takes several times the heat of a still corner.
     """
-    roughness = 9.24 * ((0.71 / 0.85) ** 0.75 - 1.0) * (1.0 + 0.28 * np.exp(-0.007 * 0.71 / 0.85))
+    ratio = prandtl / TURBULENT_PRANDTL
+    sublayer = 9.24 * (ratio**0.75 - 1.0) * (1.0 + 0.28 * np.exp(-0.007 * prandtl / TURBULENT_PRANDTL))
     walls = []
     for a in AXES:
         y = 0.5 * grid.spacing_m[a]
@@ -148,8 +151,8 @@ def heat_walls(
         for nearest in (first_plane, last_plane):
             friction = C_MU**0.25 * jnp.sqrt(nearest(k, a))
             y_plus = friction * y / molecular_m2_s
-            profile = jnp.log(jnp.maximum(WALL_E * y_plus, 40.0)) / KAPPA + roughness
-            heat = jnp.maximum(friction / (0.85 * profile), molecular_m2_s / (0.71 * y))
+            profile = jnp.log(jnp.maximum(WALL_E * y_plus, 40.0)) / KAPPA + sublayer
+            heat = jnp.maximum(friction / (TURBULENT_PRANDTL * profile), molecular_m2_s / (prandtl * y))
             sides.append(jnp.maximum(heat / NOMINAL_HEAT_M_S, 0.5))
         walls.append((sides[0], sides[1]))
     return tuple(walls)

@@ -1,17 +1,14 @@
-"""Patches on cell faces: exact covered fractions, and what a patch may not be."""
-
-from itertools import combinations
+"""Patches on cell faces: exact covered fractions, and the turbulence of supply air."""
 
 import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 
-from core.geometry import Box
-from core.room.room_grid import AXES, WALLS, RoomGrid
-from core.scene import Inlet, Outlet, Patch, Scene, Wall
+from core.geometry import WALLS, Box, face_of
+from core.room.k_epsilon import C_MU
+from core.room.room_grid import RoomGrid
+from core.scene import Inlet, Outlet, Patch, Scene
 from core.setting import SettingError
-
-C_MU = 0.09
 
 
 class Opening(eqx.Module):
@@ -24,12 +21,12 @@ class Opening(eqx.Module):
     @property
     def axis(self) -> int:
         """Axis normal to the wall."""
-        return self.wall // 2
+        return face_of(WALLS[self.wall]).axis
 
     @property
     def inward(self) -> float:
         """+1 on a lower wall, -1 on an upper one."""
-        return 1.0 if self.wall % 2 == 0 else -1.0
+        return face_of(WALLS[self.wall]).inward
 
 
 def lay_patch(patch: Patch, room: Box, grid: RoomGrid, notes: list[str]) -> Opening:
@@ -38,8 +35,8 @@ def lay_patch(patch: Patch, room: Box, grid: RoomGrid, notes: list[str]) -> Open
     Raises:
         SettingError: the patch has no area or leaves its wall.
     """
-    wall = WALLS.index(patch.wall)
-    first, second = (a for a in AXES if a != wall // 2)
+    face = face_of(patch.wall)
+    first, second = face.along
     for a, low, high in zip((first, second), patch.lower_m, patch.upper_m, strict=True):
         if not (room.lower_m[a] - 1e-6 <= low < high <= room.upper_m[a] + 1e-6):
             raise SettingError(
@@ -56,8 +53,7 @@ def lay_patch(patch: Patch, room: Box, grid: RoomGrid, notes: list[str]) -> Open
         _overlap(grid, first, patch.lower_m[0], patch.upper_m[0]),
         _overlap(grid, second, patch.lower_m[1], patch.upper_m[1]),
     )
-    area = (patch.upper_m[0] - patch.lower_m[0]) * (patch.upper_m[1] - patch.lower_m[1])
-    return Opening(wall, covered, area)
+    return Opening(face.number, covered, patch.area_m2)
 
 
 def opening_edges_m(scene: Scene) -> tuple[tuple[float, ...], ...]:
@@ -65,58 +61,11 @@ def opening_edges_m(scene: Scene) -> tuple[tuple[float, ...], ...]:
     edges: tuple[list[float], ...] = ([], [], [])
     for part in scene.boundary:
         if isinstance(part, Inlet | Outlet):
-            along = [a for a in AXES if a != WALLS.index(part.patch.wall) // 2]
-            for a, low, high in zip(along, part.patch.lower_m, part.patch.upper_m, strict=True):
+            for a, low, high in zip(
+                face_of(part.patch.wall).along, part.patch.lower_m, part.patch.upper_m, strict=True
+            ):
                 edges[a].extend((low, high))
     return tuple(tuple(e) for e in edges)
-
-
-def refuse_overlaps(patches: list[Patch]) -> None:
-    """Raise SettingError if two patches of a wall share area."""
-    for one, other in combinations(patches, 2):
-        if share_area(one, other):
-            raise SettingError(
-                f"Two patches on {one.wall} overlap: {one.lower_m} to {one.upper_m} and {other.lower_m} to "
-                f"{other.upper_m} m. Move them apart: a face is an inlet, an outlet or a heater."
-            )
-
-
-def share_area(one: Patch, other: Patch) -> bool:
-    """Whether two patches lie over one another."""
-    shared = [
-        min(h1, h2) - max(l1, l2)
-        for l1, h1, l2, h2 in zip(one.lower_m, one.upper_m, other.lower_m, other.upper_m, strict=True)
-    ]
-    return one.wall == other.wall and min(shared) > 1e-9
-
-
-def refuse_outward(inlet: Inlet, opening: Opening) -> None:
-    """Raise SettingError if the supply points out of the room."""
-    if opening.inward * inlet.velocity_m_s[opening.axis] <= 0:
-        raise SettingError(
-            f"The inlet on {inlet.patch.wall} supplies air at {inlet.velocity_m_s} m/s, which does not "
-            f"enter the room. Give a velocity with {'xyz'[opening.axis]} "
-            f"{'> 0' if opening.inward > 0 else '< 0'}, or make the patch an outlet."
-        )
-
-
-def stated_walls(scene: Scene) -> dict[str, Wall | None]:
-    """The scene's walls by name; None where nothing is stated.
-
-    Raises:
-        SettingError: a wall stated twice and differently.
-    """
-    walls: dict[str, Wall | None] = dict.fromkeys(WALLS)
-    for part in scene.boundary:
-        if isinstance(part, Wall):
-            before = walls[part.wall]
-            if before is not None and before != part:
-                raise SettingError(
-                    f"The wall {part.wall} is stated twice: {before.thermal} at {before.temperature_k} K and "
-                    f"{part.thermal} at {part.temperature_k} K. Keep one."
-                )
-            walls[part.wall] = part
-    return walls
 
 
 def supply_turbulence(inlet: Inlet) -> tuple[float, float]:

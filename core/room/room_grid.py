@@ -13,7 +13,6 @@ from jaxtyping import Array, Float
 from core.geometry import Box
 
 AXES = (0, 1, 2)
-WALLS = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
 Cells = Float[Array, "nx ny nz"]
 Velocity = tuple[Float[Array, "nx1 ny nz"], Float[Array, "nx ny1 nz"], Float[Array, "nx ny nz1"]]

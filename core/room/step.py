@@ -12,8 +12,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from core.air import Air
 from core.room.closure import AbstractClosure
-from core.room.k_epsilon import KEpsilonState
+from core.room.k_epsilon import TURBULENT_PRANDTL, KEpsilonState
 from core.room.momentum import Viscosity, momentum_rate
 from core.room.pressure import PressureSolver, pressure_solver, project
 from core.room.room_grid import (
@@ -22,7 +23,6 @@ from core.room.room_grid import (
     RoomGrid,
     Velocity,
     cut,
-    face_mean,
     first_plane,
     last_plane,
     with_walls,
@@ -72,8 +72,7 @@ def room_model(
     *,
     buoyancy_m_s2_k: float,
     molecular_m2_s: float,
-    prandtl: float = 0.71,
-    turbulent_prandtl: float = 0.85,
+    prandtl: float = Air().prandtl,
 ) -> RoomModel:
     """A model with its pressure solver made."""
     return RoomModel(
@@ -84,7 +83,7 @@ def room_model(
         jnp.float32(buoyancy_m_s2_k),
         jnp.float32(molecular_m2_s),
         jnp.float32(prandtl),
-        jnp.float32(turbulent_prandtl),
+        jnp.float32(TURBULENT_PRANDTL),
         jnp.zeros(grid.cells, jnp.float32),
     )
 
@@ -132,11 +131,6 @@ def longest_step_s(flow: Flow, model: RoomModel, courant: float) -> Float[Array,
     diffusive = jnp.maximum(viscosity.cells_m2_s, model.diffusivity_m2_s(viscosity))
     curvature = sum(1.0 / h**2 for h in grid.spacing_m)
     return 1.0 / jnp.max(rate / courant + 4.0 * curvature * diffusive + 1e-6)
-
-
-def cell_velocity_m_s(velocity: Velocity) -> Float[Array, "nx ny nz 3"]:
-    """Velocity in the cells' centres."""
-    return jnp.stack([face_mean(velocity[a], a) for a in AXES], -1)
 
 
 def _sliding_rate(model: RoomModel) -> Cells:

@@ -16,20 +16,12 @@ Field = Float[Array, "..."]
 
 
 class RoomFields(eqx.Module):
-    """A room on its vertices, as measurements see it; `outflow_excess_k` is the mean over the outlets."""
+    """A room on its vertices; `outflow_excess_k` is the mean of the air that leaves by each of its outlets."""
 
     excess_k: Float[np.ndarray, "vx vy vz"]
     pressure_m2_s2: Float[np.ndarray, "vx vy vz"]
     velocity_m_s: Float[np.ndarray, "vx vy vz 3"]
-    outflow_excess_k: float
-
-
-def vertex_axes_m(grid: RoomGrid, vertices: tuple[int, int, int]) -> tuple[Float[np.ndarray, " n"], ...]:
-    """Vertex coordinates, end planes included."""
-    return tuple(
-        np.linspace(grid.lower_m[a], grid.lower_m[a] + grid.cells[a] * grid.spacing_m[a], vertices[a])
-        for a in AXES
-    )
+    outflow_excess_k: Float[np.ndarray, " outlets"]
 
 
 def vertex_excess_k(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> Vertices:

@@ -3,8 +3,9 @@
 import numpy as np
 
 from core.geometry import Box, Vector3
-from core.problem import PlaneData, Problem, ShiftMeasurement
-from core.scene import Inlet, Outlet, Wall
+from core.known import refuse_contradicted, refuse_outward, refuse_overlaps, stated_walls
+from core.problem import Problem, ShiftMeasurement
+from core.scene import Heater, Inlet, Outlet, Wall
 from core.setting import SettingError
 from core.solve.regime import Regime
 
@@ -86,37 +87,20 @@ def _check_planes(problem: Problem) -> None:
 
 
 def _check_patches(problem: Problem) -> None:
-    inlets = [item for item in problem.scene.boundary if isinstance(item, Inlet)]
-    outlets = [item for item in problem.scene.boundary if isinstance(item, Outlet)]
-    walls = [item.wall for item in problem.scene.boundary if isinstance(item, Wall)]
-    for wall in walls:
-        if walls.count(wall) > 1:
-            raise SettingError(f"The wall {wall} is described {walls.count(wall)} times; describe it once.")
-    placed = [*inlets, *outlets]
-    for place, first in enumerate(placed):
-        for second in placed[place + 1 :]:
-            if first.patch.wall == second.patch.wall and _overlap(first.patch, second.patch):
-                raise SettingError(
-                    f"The {first.kind} and the {second.kind} on {first.patch.wall} overlap "
-                    f"({first.patch.lower_m} to {first.patch.upper_m} m and {second.patch.lower_m} to "
-                    f"{second.patch.upper_m} m): they contradict each other. Move one."
-                )
-    for inlet in inlets:
-        axis, sign = "xyz".index(inlet.patch.wall[0]), 1 if inlet.patch.wall.endswith("min") else -1
-        if sign * inlet.velocity_m_s[axis] < 0:
-            raise SettingError(
-                f"The inlet on {inlet.patch.wall} has velocity {inlet.velocity_m_s} m/s, which leaves "
-                "the room. Turn its sign, or call it an outlet."
-            )
+    parts = [item for item in problem.scene.boundary if isinstance(item, Inlet | Outlet | Heater)]
+    stated_walls(problem.scene)
+    refuse_overlaps(parts)
+    for inlet in (item for item in parts if isinstance(item, Inlet)):
+        refuse_outward(inlet)
 
 
 def _check_supply(problem: Problem) -> None:
-    """Inlets against what a plane measured there, and against a room that lets nothing out."""
+    """Supplies and heaters against what a plane measured there, supplies against a room that lets nothing out."""
     scene = problem.scene
     inlets = [item for item in scene.boundary if isinstance(item, Inlet)]
     for plane in problem.planes:
-        for inlet in (i for i in inlets if i.patch.wall == plane.wall):
-            _check_inlet_on_plane(inlet, plane, scene.air.ambient_temperature_k)
+        for part in (p for p in scene.boundary if isinstance(p, Inlet | Heater)):
+            refuse_contradicted(part, plane, scene.air.ambient_temperature_k)
     closed = {item.wall for item in scene.boundary if isinstance(item, Wall) and item.no_slip}
     lets_out = problem.planes or any(isinstance(item, Outlet) for item in scene.boundary)
     if inlets and not lets_out and len(closed) == 6:
@@ -124,34 +108,6 @@ def _check_supply(problem: Problem) -> None:
             f"Air enters through {len(inlets)} inlet(s), all six walls are closed, and there is no outlet: mass "
             "cannot be conserved. Add the outlet, or leave out a wall that is not closed."
         )
-
-
-def _check_inlet_on_plane(inlet: Inlet, plane: PlaneData, ambient_k: float) -> None:
-    """The middle half of the patch: a measured edge is smeared."""
-    inside = []
-    for axis_m, low, high in zip(
-        (plane.first_m, plane.second_m), inlet.patch.lower_m, inlet.patch.upper_m, strict=True
-    ):
-        quarter = (high - low) / 4
-        inside.append((axis_m > low + quarter) & (axis_m < high - quarter))
-    found = plane.temperature_k[np.ix_(*inside)]
-    if found.size == 0:
-        return
-    measured_k = float(np.median(found))
-    if abs(measured_k - inlet.temperature_k) > 1.0 + 0.25 * abs(inlet.temperature_k - ambient_k):
-        raise SettingError(
-            f"The inlet on {plane.wall} is stated at {inlet.temperature_k:g} K, and the plane {plane.wall} has "
-            f"{measured_k:g} K in it: they contradict each other. Correct the one that is wrong, or leave it out."
-        )
-
-
-def _overlap(first, second) -> bool:
-    return all(
-        a_low < b_high and b_low < a_high
-        for a_low, a_high, b_low, b_high in zip(
-            first.lower_m, first.upper_m, second.lower_m, second.upper_m, strict=True
-        )
-    )
 
 
 def _in_room(room: Box, point_m: Vector3) -> bool:

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from core.geometry import Box
+from core.geometry import Box, face_of
+from core.known import leaving_excess_k, measured_outlets
 from core.losses.boussinesq import FlowValues, Numbers, Scales, scales
 from core.losses.representation import Spans, positions
 from core.problem import Problem
@@ -70,13 +71,12 @@ def height_profile(problem: Problem, frame: Frame, spans: Spans) -> FlowValues:
     shape = tuple(span[2] for span in spans)
     temperature = np.zeros(shape, np.float32)
     pressure = np.zeros(shape, np.float32)
-    leaving = measured_outlets(problem)
-    if leaving:
-        level_k = float(np.mean([kelvin for _, kelvin in leaving]))
-        level = (level_k - frame.scales.reference_k) / frame.scales.excess_k
+    leaving_k = leaving_excess_k(problem) if measured_outlets(problem.scene) else None
+    if leaving_k is not None:
+        level = leaving_k / frame.scales.excess_k
         temperature += level
         pressure += frame.numbers.richardson * level * (positions(spans[2]) - outlet_height(problem, frame))
-    upright = [plane for plane in problem.planes if plane.wall[0] in "xy"]
+    upright = [plane for plane in problem.planes if face_of(plane.wall).axis != 2]
     if upright:
         plane, scales = upright[0], frame.scales
         z_m = frame.room.lower_m[2] + scales.length_m * positions(spans[2])
@@ -88,15 +88,6 @@ def height_profile(problem: Problem, frame: Frame, spans: Spans) -> FlowValues:
     return FlowValues(jnp.asarray(temperature), jnp.asarray(pressure), jnp.zeros((*shape, 3)))
 
 
-def measured_outlets(problem: Problem) -> list[tuple[Outlet, float]]:
-    """The outlets whose mean temperature is known, with it."""
-    return [
-        (item, item.mean_temperature_k)
-        for item in problem.scene.boundary
-        if isinstance(item, Outlet) and item.mean_temperature_k is not None
-    ]
-
-
 def outlet_height(problem: Problem, frame: Frame) -> float:
     """Where p is zero: the mean height of the outlets' middles, nondimensional; the floor without any."""
     outlets = [item for item in problem.scene.boundary if isinstance(item, Outlet)]
@@ -106,8 +97,9 @@ def outlet_height(problem: Problem, frame: Frame) -> float:
 def _height(outlet: Outlet, frame: Frame) -> float:
     """Of the patch's middle, where p is zero: nondimensional."""
     room, patch = frame.room, outlet.patch
-    if patch.wall[0] == "z":
-        return frame.upper[2] if patch.wall == "z_max" else frame.lower[2]
+    face = face_of(patch.wall)
+    if face.axis == 2:
+        return frame.upper[2] if face.upper else frame.lower[2]
     middle_m = (patch.lower_m[1] + patch.upper_m[1]) / 2
     return (middle_m - room.lower_m[2]) / frame.scales.length_m
 

@@ -2,19 +2,19 @@
 
 from typing import Literal
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from core.data_error import WALL_MARGIN
 from core.losses.boundary_loss import boundary_loss, level_loss, point_losses
 from core.losses.image_rows import pixel_centres, rendered_rows, warped_rows
 from core.losses.physics import Loss, PhysicsLoss, PriorLoss, SmoothnessLoss
-from core.losses.shifts import ShiftLoss, ShiftRows, displacement_rows, similarity_basis
+from core.losses.shifts import ShiftLoss, ShiftRows, displacement_rows, drift_basis
 from core.losses.traced import TracedLoss, rendered_view, traced_windows
 from core.problem import ImagePair, Problem, ShiftMeasurement
 from core.rays.operator import build
-from core.rays.optics import pinhole
+from core.rays.visibility import away_from_walls
 from core.scene import Scene
 from core.setting import SettingError, setting
 from core.solve.nondimensional import Frame, height_profile
@@ -54,7 +54,7 @@ class DataModel:
 
     representation: float = 0.1
     outlier: float = 6.0
-    margin: float = 0.05
+    margin: float = WALL_MARGIN
     drift_std_px: float | None = None
 
 
@@ -145,7 +145,7 @@ def _windows(problem: Problem, view: int, data: DataModel, shape: tuple[int, int
     kept, model_std_px = _kept_windows(problem, view, data)
     camera = problem.scene.views[view].camera
     operator = build(problem.scene, view, kept.centres_px, shape, window_px=float(kept.window_px))
-    basis = similarity_basis(kept.centres_px, (camera.width_px, camera.height_px))
+    basis = drift_basis(kept.centres_px, (camera.width_px, camera.height_px))
     return displacement_rows(kept, operator, basis, model_std_px)
 
 
@@ -182,16 +182,7 @@ def _away_from_walls(
     used: Bool[np.ndarray, " places"],
 ) -> Bool[np.ndarray, " places"]:
     """Which of those used lie further than `margin` from the back wall's edges. Raises SettingError if none."""
-    lens, room = scene.views[view].camera, scene.room
-    directions = np.asarray(
-        jax.vmap(pinhole(lens).direction)(jnp.asarray(centres_px, jnp.float32)), np.float64
-    )
-    reach = (room.upper_m[1] - lens.position_m[1]) / np.maximum(directions[:, 1], 1e-9)
-    points = np.array(lens.position_m) + reach[:, None] * directions
-    inside = used.copy()
-    for axis in (0, 2):
-        gap = margin * room.size_m[axis]
-        inside &= (points[:, axis] > room.lower_m[axis] + gap) & (points[:, axis] < room.upper_m[axis] - gap)
+    inside = used & away_from_walls(scene, view, centres_px, margin)
     if not inside.any():
         raise SettingError(
             f"View {scene.views[view].name!r} sees nothing of the room away from its walls. "

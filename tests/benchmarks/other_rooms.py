@@ -173,7 +173,7 @@ def _empty(name: str, what: Made) -> RoomVolume:
 
 def _arrays(what: Made, volume: RoomVolume, fine: Room, model: RoomModel, flow: Any) -> dict[str, Any]:
     """The volume's arrays, named as in the format."""
-    field = room_fields(flow, model, what.vertices)
+    field = room_fields(flow, model, fine.layout, what.vertices)
     nut = np.asarray(model.viscosity(flow).cells_m2_s) - NU
     for a in AXES:
         edge = [(1, 1) if b == a else (0, 0) for b in AXES]

@@ -4,7 +4,7 @@ from scipy import ndimage
 
 from calibration.drift import measure_drift
 from calibration.errors import ImageError
-from calibration.registration import Similarity, border_mask, register
+from calibration.registration import FiniteSimilarity, border_mask, register
 
 SIZE = 384
 
@@ -17,7 +17,7 @@ def texture(seed: int) -> np.ndarray:
     return 0.5 + 0.15 * total / total.std()
 
 
-def moved(picture: np.ndarray, motion: Similarity, plume_px: float = 0.0) -> np.ndarray:
+def moved(picture: np.ndarray, motion: FiniteSimilarity, plume_px: float = 0.0) -> np.ndarray:
     """The picture after the motion (quintic splines), with a plume's shift in the middle."""
     y, x = np.mgrid[:SIZE, :SIZE].astype(float)
     back = np.linalg.inv(motion.matrix)
@@ -32,8 +32,8 @@ def counts(picture: np.ndarray, seed: int) -> np.ndarray:
     return np.clip(np.rint(electrons * 0.1007 + 16), 0, 1023).astype(np.uint16)
 
 
-def similarity(x: float, y: float, degrees: float = 0.0) -> Similarity:
-    return Similarity(np.array([x, y]), float(np.deg2rad(degrees)), 1.0, np.full(2, (SIZE - 1) / 2))
+def similarity(x: float, y: float, degrees: float = 0.0) -> FiniteSimilarity:
+    return FiniteSimilarity(np.array([x, y]), float(np.deg2rad(degrees)), 1.0, np.full(2, (SIZE - 1) / 2))
 
 
 CORNERS = np.array([[0.0, 0.0], [SIZE - 1, 0.0], [0.0, SIZE - 1], [SIZE - 1, SIZE - 1]])
@@ -66,7 +66,7 @@ def test_camera_and_projector_are_told_apart_by_printed_marks():
     for top, left in ((4, 4), (4, 300), (300, 4), (300, 300)):
         marks[top : top + 76, left : left + 76] = True
     printed, pattern = texture(5), texture(6)
-    both = Similarity(np.zeros(2), 0.0, 1.0, camera.centre_px)
+    both = FiniteSimilarity(np.zeros(2), 0.0, 1.0, camera.centre_px)
     both = similarity(*(projector.matrix @ camera.matrix @ [191.5, 191.5, 1])[:2] - 191.5, 0.02)
     reference = np.where(marks, printed, pattern)
     flow = np.where(marks, moved(printed, camera), moved(pattern, both))

@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from core.plan.cost import draft_work, grid_work, level_of
+from core.known import level_of
+from core.plan.cost import draft_work, grid_work
 from core.plan.expected import expected_flow
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import signal

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from core.known import VertexGrid
+from core.known_temperature import VertexGrid
 from core.problem import Problem
 from core.rays.operator import StraightRayOperator, build
 from core.result import Solution

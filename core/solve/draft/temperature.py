@@ -24,7 +24,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
 from core.air import Air
-from core.known import VertexGrid, known_temperature
+from core.known_temperature import VertexGrid, known_temperature
 from core.problem import Problem, ShiftMeasurement
 from core.result import Outcome, Solution
 from core.scene import ProjectedPattern

@@ -12,7 +12,9 @@ from jaxtyping import Float
 from scipy.ndimage import gaussian_filter
 
 from core.air import Air
-from core.known import KnownTemperature, VertexGrid, known_temperature, plane_on_grid, wall_index
+from core.data_error import CORRELATED_DATA
+from core.geometry import face_of
+from core.known_temperature import KnownTemperature, VertexGrid, known_temperature, plane_on_grid
 from core.problem import Problem, ShiftMeasurement
 from core.scene import Heater, Inlet, Outlet
 from core.setting import setting
@@ -42,7 +44,7 @@ class TemperatureSettings:
     tolerance: float = 1e-3
     max_iterations: int = 400
     draws: int = 6
-    together: float = 12.0
+    together: float = CORRELATED_DATA
 
 
 def profile_weight(reach: float, grid: VertexGrid) -> float:
@@ -75,7 +77,7 @@ def prior_temperature(problem: Problem, grid: VertexGrid) -> Volume:
     rise_k = _RISE * profile_range_k(problem) if len(known_air_k(problem)) > 1 else 0.0
     volume = np.broadcast_to(level + rise_k * np.linspace(-0.5, 0.5, grid.shape[2]), grid.shape).copy()
     for plane in problem.planes[:1]:
-        axis, _ = wall_index(plane.wall)  # type: ignore[arg-type]
+        axis = face_of(plane.wall).axis
         on_grid = np.expand_dims(plane_on_grid(grid, plane, plane.temperature_k), axis)
         volume[...] = np.median(on_grid, axis=(0, 1), keepdims=True)
     return volume

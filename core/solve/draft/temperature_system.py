@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator
 
-from core.known import KnownTemperature, VertexGrid
+from core.known_temperature import KnownTemperature, VertexGrid
 from core.scene import Scene
 
 Volume = Float[np.ndarray, "nx ny nz"]

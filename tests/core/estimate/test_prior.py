@@ -7,8 +7,8 @@ import pytest
 
 from core.estimate.diagnostics import undetermined
 from core.estimate.forward_runs import Derivatives, differences
+from core.geometry import WALLS
 from core.problem import Problem
-from core.room.room_grid import WALLS
 from core.room.vertices import RoomFields
 from core.scene import FlowModel, Wall
 from tests.core.estimate.test_temperature_nudging import VERTICES, prior_of, problem
@@ -67,13 +67,16 @@ def test_unknown_walls_are_not_let_go_and_moved_a_little_only():
 def test_derivatives_are_per_prior_deviation_whatever_the_steps():
     def room_of(excess_k: float) -> RoomFields:
         return RoomFields(
-            np.full(VERTICES, excess_k), np.zeros(VERTICES), np.zeros((*VERTICES, 3)), 2.0 * excess_k
+            np.full(VERTICES, excess_k),
+            np.zeros(VERTICES),
+            np.zeros((*VERTICES, 3)),
+            np.array([2.0 * excess_k]),
         )
 
     found = Derivatives(room_of(1.0), [room_of(7.0), room_of(1.6)], np.array([2.0, 0.3]))
 
     np.testing.assert_allclose(found.per_deviation(lambda seen: seen.excess_k.mean()), [3.0, 2.0])
-    np.testing.assert_allclose(found.per_deviation(lambda seen: seen.outflow_excess_k), [6.0, 4.0])
+    np.testing.assert_allclose(found.per_deviation(lambda seen: seen.outflow_excess_k[0]), [6.0, 4.0])
     empty = Derivatives(room_of(1.0), [], np.zeros(0))
     assert empty.per_deviation(lambda seen: seen.excess_k).shape == (0, *VERTICES)
 

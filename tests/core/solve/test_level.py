@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core.geometry import Box, looking_along_y
-from core.known import VertexGrid
+from core.known_temperature import VertexGrid
 from core.losses.boundary_loss import level_loss
 from core.losses.representation import Unknowns
 from core.problem import Problem, ShiftMeasurement
