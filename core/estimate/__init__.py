@@ -1,1 +1,14 @@
-"""Estimate a room from measurements: prior, observation operator, fit, posterior, diagnostics."""
+"""Estimate a room from measurements: prior, observation operator, fit, posterior, diagnostics.
+
+The model of the room is `core.room`; `core.solve.room` runs the whole estimation. README.md has the method.
+
+Reading order:
+
+    what is estimated   balance, plane_openings, prior
+    what is measured    observation
+    forward runs        forward_runs
+    the fit             least_squares, parameter_step, heaters, parameter_fit, levenberg_marquardt
+    the last level      discrepancy, temperature_nudging
+    other rooms         unstated_heat, alternatives
+    the result          uncertainty, posterior, diagnostics
+"""

@@ -1,7 +1,6 @@
-"""Other rooms that may explain the images better: one with heat that nobody stated, one under another closure.
+"""Model selection: is another closure, or a heat source that nobody stated, a better explanation of the images?
 
-They cost a fit each, so they are asked for where the fitted room leaves so much of the images that it is not to be
-believed.
+Each alternative costs a whole fit. It is tried only where the fitted room leaves much of the images unexplained.
 """
 
 from core.estimate.forward_runs import Event, RoomSettings, other_closure
@@ -11,32 +10,38 @@ from core.estimate.unstated_heat import with_suspected_heat
 from core.problem import Problem
 from core.room.forward import Room
 
-# Rooms whose closure is right leave 8 to 22 % of the shifts (rms) at 48 cells, those under another 29 to 40, those
-# without a heater of theirs 60: it is kept where it takes a fifth off that.
-_MUCH, _MOST, HEAT_WORTHWHILE = 0.25, 0.45, 0.8
+# Shares of the measured shifts (rms) that a fitted room leaves unexplained. At 48 cells rooms with the right closure
+# leave 8 to 22 %, rooms with a wrong one 29 to 40 %, and rooms that lack a heater 60 %.
+_TRY_CLOSURE, _TRY_HEAT = 0.25, 0.45
+# The room with the added heater is kept if it leaves at most this share of what the room without it leaves.
+KEEP_HEAT = 0.8
 
 
 def left_over(analysis: Analysis) -> float:
-    """Share (rms) of the measured shifts that a fitted room leaves."""
+    """Share (rms) of the measured shifts that a fitted room leaves unexplained."""
     return unexplained(analysis.data, analysis.best.fields)
 
 
 def suspected_heat(
     analysis: Analysis, background: Background, settings: RoomSettings, report: Event
 ) -> Problem | None:
-    """The problem with heat that nobody stated, where unknown walls do not explain the images and it may; or None."""
-    if not settings.use_images or not background.prior.unknown_walls() or left_over(analysis) < _MOST:
+    """The problem with a heater added that nobody stated; None where no such heater would help.
+
+    It is looked for only where walls are unknown and the fitted room leaves much of the images unexplained.
+    """
+    if not settings.use_images or not background.prior.unknown_walls() or left_over(analysis) < _TRY_HEAT:
         return None
     return with_suspected_heat(background, analysis.data, settings, report)
 
 
 def promising_closure(analysis: Analysis, coarse: Room) -> str | None:
-    """The other closure, where nobody stated one and it may explain the images better than the fitted room; or None.
+    """The other closure if it should be fitted as well; None if not, or if the scene states the closure.
 
-    So it may where a coarse room under it leaves less of them, and where the fitted one leaves much.
+    It should if the fitted room leaves much of the images unexplained, or more of them than a coarse room
+    under the other closure does.
     """
     if analysis.problem.scene.flow.transport != "auto":
         return None
     left = left_over(analysis)
-    worth = left > _MUCH or unexplained(analysis.data, analysis.other) < left
+    worth = left > _TRY_CLOSURE or unexplained(analysis.data, analysis.other) < left
     return other_closure(coarse) if worth else None

@@ -1,7 +1,7 @@
-"""What the balance of heat says of walls: supply brings it, walls and what leaves take it.
+"""The heat balance of the room: the supply brings heat; the outlets and the walls take it away.
 
-A thermometer in what leaves is worth a number that nobody can state: the walls' common heat coefficient, or the one
-temperature of walls that nobody knows.
+With a thermometer in the air that leaves, the balance gives one number that nobody can state: the heat coefficient
+that all walls share or, where walls are unknown, the temperature that they share.
 """
 
 import numpy as np
@@ -17,9 +17,10 @@ from core.room.k_epsilon import NOMINAL_HEAT_M_S
 def free_walls_k(
     problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
 ) -> tuple[float, float]:
-    """The one temperature of all unknown walls that closes the heat balance, and its distance from the air.
+    """The shared temperature of the unknown walls that closes the heat balance, and its distance from the air.
 
-    Without a thermometer in what leaves it is the ambient one; it stays within the supply's contrast.
+    Both are excess temperatures. Without a measured outflow temperature the walls get the ambient one. The
+    distance is limited to the supply's excess temperature.
     """
     leaving = leaving_excess_k(problem)
     if leaving is None or not layout.inlets:
@@ -38,7 +39,7 @@ def free_walls_k(
 
 
 def _heated_areas_m2(layout: RoomLayout) -> Float[np.ndarray, "6"]:
-    """Area of each wall that passes heat."""
+    """Area of each wall; 0 for an adiabatic one."""
     grid = layout.grid
     return (
         np.array([grid.face_area_m2(w // 2) * np.prod(grid.plane(w // 2)) for w in range(6)]) * layout.heated
@@ -46,7 +47,7 @@ def _heated_areas_m2(layout: RoomLayout) -> Float[np.ndarray, "6"]:
 
 
 def supply_m3_s(layout: RoomLayout) -> Float[np.ndarray, " inlets"]:
-    """Volume flow of each inlet as stated."""
+    """Volume flow of each inlet, as stated."""
     return np.array(
         [
             o.inward * v[o.axis] * o.area_m2
@@ -58,7 +59,10 @@ def supply_m3_s(layout: RoomLayout) -> Float[np.ndarray, " inlets"]:
 def heat_balance_m_s(
     problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
 ) -> float | None:
-    """One heat coefficient for all walls that closes the balance, within a factor of four of the guess; or None."""
+    """The heat coefficient of all walls that closes the balance; None where the balance cannot tell it.
+
+    It is limited to a factor of four about the nominal one.
+    """
     leaving = leaving_excess_k(problem)
     areas = _heated_areas_m2(layout)
     if leaving is None or not layout.inlets or layout.heaters or areas.sum() == 0:
@@ -66,14 +70,14 @@ def heat_balance_m_s(
     brought = float(np.dot(supply_m3_s(layout), inlet_excess_k - leaving))
     inside = _room_excess_k(problem, leaving)
     lost = float((areas * (inside - wall_excess_k)).sum())
-    # Heat that flows from cold to warm says that something else is missing, not how well walls conduct.
+    # If heat would have to flow from cold to warm, something else is missing, and the balance tells nothing.
     if not brought * lost > 0:
         return None
     return float(np.clip(brought / lost, NOMINAL_HEAT_M_S / 4, NOMINAL_HEAT_M_S * 4))
 
 
 def _room_excess_k(problem: Problem, leaving: float) -> float:
-    """Mean temperature of the room's air: a side wall's plane, else what leaves."""
+    """Mean excess temperature of the room's air: from a plane on a side wall, else that of the outflow."""
     for plane in air_planes(problem):
         return (
             float(plane.temperature_k[still_vertices(plane)].mean()) - problem.scene.air.ambient_temperature_k

@@ -1,4 +1,4 @@
-"""What a fit says to the operator: balances, entries that the images contradict, and what to distrust."""
+"""Sentences for the operator: heat balance, entries that the images contradict, what not to trust."""
 
 import numpy as np
 from jaxtyping import Float
@@ -11,17 +11,18 @@ from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.scene import Heater, Inlet
 
-# An entry is contradicted when the fit moves it by this many of its stated deviations, and of its own.
+# An entry is contradicted if the fit moves it by more than this many prior, and posterior, standard deviations.
 _SIGMAS = 2.0
-# Of the heat that supplies bring: what is missing beyond that is said.
+# Missing heat is reported above this share of the heat that the supplies bring.
 _MISSING_SHARE = 0.1
+# The velocity is called doubtful if more than this share of the shifts (rms) is unexplained.
 _POOR_FIT = 0.35
-# Of a panel's temperature above the air: less is no heater.
+# A floor panel is reported if it is warmer, or colder, than the air by at least this.
 _SUSPICIOUS_K = 8.0
 
 
 def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list[str]:
-    """Sentences about entered values that the measurements do not believe."""
+    """One sentence for each entered value that the measurements contradict."""
     fitted = prior.parameters(posterior.vector)
     moved = dict(zip(prior.names(), posterior.vector, strict=True))
     own = dict(zip(prior.names(), np.sqrt(np.diag(posterior.covariance)), strict=True))
@@ -62,7 +63,7 @@ def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list
 
 
 def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
-    """What the images say of a strip of floor `by_k` warmer than the air, where it is worth saying."""
+    """A sentence about a strip of floor that the fit made `by_k` warmer than the air; none if it is small."""
     if abs(by_k) < _SUSPICIOUS_K:
         return []
     lower, upper = heater.patch.lower_m, heater.patch.upper_m
@@ -70,13 +71,13 @@ def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
     return [
         f"The images ask for {'heat' if by_k > 0 else 'cold'} that is not in the scene: as of a floor panel of "
         f"{size} m, {abs(by_k):.0f} K {'warmer' if by_k > 0 else 'colder'} than the air, at x = {lower[0]:.1f} to "
-        f"{upper[0]:.1f} m. How deep in the room it is one view does not report: half-way was taken. State it as a "
-        "heater."
+        f"{upper[0]:.1f} m. One view does not tell how deep in the room it is; the middle was assumed. State "
+        "it as a heater."
     ]
 
 
 def misfit(data: Observations, share: float) -> list[str]:
-    """A sentence on how much of the measured shifts the room explains, with a warning when it is little."""
+    """How much of the measured shifts is left unexplained, with a warning if it is much."""
     if not data.shifts:
         return []
     said = [f"{100 * share:.0f} % (rms) of the measured shifts is left unexplained by the fitted room."]
@@ -89,7 +90,7 @@ def misfit(data: Observations, share: float) -> list[str]:
 
 
 def another_closure(name: str, left: float, stated: str, stated_left: float) -> str:
-    """Why a closure was taken that is not the default one."""
+    """A sentence that says which closure was taken, and why."""
     return (
         f"The images are explained better under the {name} closure ({100 * left:.0f} % of the shifts left) than "
         f"under {stated} ({100 * stated_left:.0f} %): it was taken. State flow.transport to keep one."
@@ -103,9 +104,9 @@ def balances(
     problem: Problem,
     held_k_m3_s: float = 0.0,
 ) -> list[str]:
-    """Heat that comes with the supplies and leaves through outlet and walls.
+    """The room's heat balance in words, and a warning if heat is missing.
 
-    `held_k_m3_s` is what keeping the measured temperatures took, over the whole room.
+    `held_k_m3_s` is the heat source, over rho c and the whole room, that holding the measured temperatures took.
     """
     inflow_m3_s = float(inflows_m3_s.sum())
     if inflow_m3_s <= 0:
@@ -120,26 +121,27 @@ def balances(
     missing = capacity_w_m3_k * held_k_m3_s
     if abs(missing) > _MISSING_SHARE * abs(brought):
         said.append(
-            f"The temperatures that were measured take {abs(missing):.0f} W {'more' if missing > 0 else 'less'} "
-            "than supply, heaters and walls bring in the fitted room: a source, a leak or a wall is not as stated."
+            f"To hold the measured temperatures the fitted room needs {abs(missing):.0f} W "
+            f"{'more' if missing > 0 else 'less'} than supply, heaters and walls give it: a source, a leak or a "
+            "wall is not as stated."
         )
     return said
 
 
 def undetermined(problem: Problem) -> list[str]:
-    """What the stated information cannot determine."""
+    """One sentence on what the stated information cannot determine; none if all is stated."""
     driving = [b for b in problem.scene.boundary if isinstance(b, Inlet | Heater)]
     if all(isinstance(b, SuspectedHeater) for b in driving):
         return [
-            "No inlet or heater is stated: nothing says what drives the air. Velocity is not determined by "
-            "these measurements; the one given is that of still air left to the walls, and is not to be used."
+            "No inlet or heater is stated, so nothing says what drives the air. These measurements do not "
+            "determine the velocity: the one given is that of air driven by the walls alone. Do not use it."
         ]
     walls = stated_walls(problem.scene)
     if all(wall is None for wall in walls.values()):
         return [
-            "No wall is stated: openings were taken from the plane of known velocity, the walls' temperatures "
-            "were fitted, and anything else that drives the air is missing. Velocity is not determined by "
-            "these measurements: the one given is a guess of the room model. State the walls to use it."
+            "No wall is stated. Openings were read off the plane of known velocity, and the walls' temperatures "
+            "were fitted; anything else that drives the air is missing. These measurements do not determine the "
+            "velocity: the one given is the room model's guess. State the walls to use it."
         ]
     unknown = unknown_walls(problem.scene)
     if unknown:
@@ -149,7 +151,7 @@ def undetermined(problem: Problem) -> list[str]:
             else ""
         )
         return [
-            f"What passes through {', '.join(unknown)} is not stated and was fitted to the measurements{alike}. "
-            "Velocity hinges on it: a stated wall temperature, or 'adiabatic', is worth more than more frames."
+            f"The heat through {', '.join(unknown)} is not stated; it was fitted to the measurements{alike}. "
+            "The velocity depends on it: stating a wall's temperature, or 'adiabatic', helps more than more frames."
         ]
     return []

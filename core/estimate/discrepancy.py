@@ -1,12 +1,12 @@
-"""What parameters leave unexplained: a smooth temperature correction, the same along the view.
+"""Model discrepancy in T: a smooth correction of the temperature for what no parameter explains.
 
-    T <- T + sum c_ij b_i(x) b_j(z),   c ~ normal(0, K),   linear least squares on the last misfit
+    T <- T + sum c_ij b_i(x) b_j(z),   c ~ normal(0, K),   linear least squares on the last residual
 
-A view's rays run along y, so a single view sees only the mean along them. K lets profiles of height err
-further than patches of the section, and the level of all as far as what was stated leaves it open: images
-do not see it, thermometers do (a plane, an outlet's, sensors). A plane on a wall of unknown temperature lies
-in a layer that the room may have wrong everywhere alike. Held walls keep their temperature. Velocity is left
-alone: nudging it to fit images does not repair it.
+The correction is constant along y, the direction of view, since one view sees only the mean along its rays.
+K has three parts: errors of the profile over height, local errors in the x-z section, and an error of the
+level (the mean). Images do not see the level; thermometers do (a plane, outlets, sensors). A plane on a wall
+of unknown temperature lies in that wall's thermal layer, which the model may have wrong by one constant: that
+constant is estimated too. Walls of stated temperature keep it. The velocity is not corrected.
 """
 
 from collections.abc import Collection
@@ -23,19 +23,24 @@ from core.estimate.observation import IMAGES, PLANES, Observations, ShiftBlocks
 from core.geometry import face_of
 from core.room.vertices import linear_matrix
 
-# Neighbouring data err together: so many count as one.
+# So many neighbouring data count as one. Fewer than in the fit of the parameters (`core.data_error`): what
+# neighbours have wrong in common is what the correction is to take up.
 _CORRELATED = 4.0
+# Basis functions along x and z.
 _LATTICE = (9, 11)
+# Correlation length of K, as a share of the room.
 _LENGTH_SHARE = 0.2
-# Of the misfit that is left, this share is taken for what no smooth correction can explain.
+# Of K's variance: errors of the profile over height, and local errors.
+_PROFILE_PART, _LOCAL_PART = 0.7, 0.3
+# Of the residual, this share is taken as representation error: no smooth correction can explain it.
 _UNEXPLAINED = 0.5
-# As shares of the departures from a level: the correction's own, where images pull no further without harm;
-# how far air at one point is from its section; a plane's layer on a wall of unknown temperature.
+# Standard deviations as shares of the rms departure of T from its mean at each height: the correction's; that of
+# one point from the mean along y; that of the layer of a plane on a wall of unknown temperature.
 _DEPARTURE_SHARE, _POINT_SHARE, _LAYER_SHARE = 0.1, 0.3, 1.0
 
 
 class Correction(eqx.Module):
-    """The correction on vertices, and its variance before and after the data, all the same along y."""
+    """The correction on vertices, and its prior and posterior variance; all constant along y."""
 
     excess_k: Float[np.ndarray, "vx vz"]
     prior_variance_k2: Float[np.ndarray, "vx vz"]
@@ -50,9 +55,10 @@ def temperature_correction(
     level_std_k: float,
     unknown_walls: Collection[str] = (),
 ) -> Correction:
-    """Fit the correction to `residual` (data minus prediction of `excess_k`).
+    """Fit the correction to `residual`, the data minus the prediction from `excess_k`.
 
-    `departure_k` is the size of the room's departures from a level; `level_std_k` how far the level may be off.
+    `departure_k` is the rms departure of T from its mean at each height; `level_std_k` is the prior standard
+    deviation of the level.
     """
     nx, _, nz = excess_k.shape
     along_x, along_z = (
@@ -74,7 +80,7 @@ def temperature_correction(
     ):
         own = group == g
         if own.any():
-            # A thermometer stands in one place, which no smooth correction describes.
+            # A thermometer reads one point, and the correction is a mean along y.
             pooled = g in (IMAGES, PLANES)
             error = _UNEXPLAINED * spread(residual[own]) if pooled else _POINT_SHARE * departure_k
             weight = 1.0 / (variance[own] + error**2) / (_CORRELATED if pooled else 1.0)
@@ -93,33 +99,33 @@ def temperature_correction(
 
 
 def _layer_design(data: Observations, unknown_walls: Collection[str]) -> Float[np.ndarray, "data layers"]:
-    """Plane temperatures of every block per kelvin of the layer of each plane on an unknown wall."""
+    """Derivative of the planes' blocks in the layer constant of each plane on an unknown wall."""
     blocks = data.plane_blocks()
     columns = np.repeat(np.eye(len(blocks)), blocks, axis=0)
     return columns[:, [plane.wall in unknown_walls for plane in data.planes]]
 
 
 def _prior_k2(std_k: float) -> Float[np.ndarray, "lattice lattice"]:
-    """Covariance: half of it a function of height alone, half local; correlated over a fifth of the room."""
+    """Covariance K without its level: 0.7 of it depends on height alone, 0.3 is local."""
     x, z = (np.linspace(0, 1, m) for m in _LATTICE)
     near_x = np.exp(-np.abs(x[:, None] - x[None, :]) / _LENGTH_SHARE)
     near_z = np.exp(-np.abs(z[:, None] - z[None, :]) / _LENGTH_SHARE)
     size = len(x) * len(z)
-    kernel = 0.7 * np.ones_like(near_x)[:, None, :, None] + 0.3 * near_x[:, None, :, None]
+    kernel = _PROFILE_PART * np.ones_like(near_x)[:, None, :, None] + _LOCAL_PART * near_x[:, None, :, None]
     covariance = (kernel * near_z[None, :, None, :]).reshape(size, size)
     return std_k**2 * (covariance + 1e-6 * np.eye(size))
 
 
 def _sensor_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
-    """Sensors' temperatures per kelvin of every coefficient."""
+    """Derivative of the sensors' temperatures in every coefficient."""
     points = [s.position_m[np.isfinite(s.temperature_k)] for s in data.sensors]
     return _at_points(data, np.concatenate([np.zeros((0, 3)), *points]))
 
 
 def _outlet_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
-    """The outlet's mean temperature per kelvin of every coefficient: of the whole section at its height.
+    """Derivative of the outlets' temperatures in every coefficient, as the mean over x at the outlet's height.
 
-    At its wall, which windows do not see, the correction is but the continuation of what is beside it.
+    Windows beside walls are left out, so the correction at the outlet's own wall is an extrapolation only.
     """
     rows = [np.zeros((0, _LATTICE[0] * _LATTICE[1]))]
     for _, outlet, _ in data.outlets:
@@ -138,7 +144,7 @@ def _outlet_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
 def _at_points(
     data: Observations, points_m: Float[np.ndarray, "points 3"]
 ) -> Float[np.ndarray, "points lattice"]:
-    """Every basis function at points."""
+    """The basis functions at points."""
     box = data.scene.room
     share = (points_m - np.asarray(box.lower_m)) / np.asarray(box.size_m)
     x, z = (
@@ -151,7 +157,7 @@ def _at_points(
 def _shift_design(
     data: Observations, excess_k: Float[np.ndarray, "vx vy vz"], basis: Float[np.ndarray, "lattice vx vz"]
 ) -> Float[np.ndarray, "blocks lattice"]:
-    """Shifts of every block per kelvin of every coefficient."""
+    """Derivative of the blocks' shifts in every coefficient."""
     air = data.scene.air
     slope = (
         -air.ambient_refractivity * air.ambient_temperature_k / (air.ambient_temperature_k + excess_k) ** 2
@@ -163,7 +169,7 @@ def _shift_design(
     if not columns:
         return np.zeros((0, len(basis)))
     design = np.concatenate(columns)
-    # A kelvin more bends light 0.7 % less: far below what a room has wrong, so images are not asked for the level.
+    # One kelvin on the level changes the shifts by 0.7 %, far less than the model error: images do not set the level.
     return design - design.mean(axis=1, keepdims=True)
 
 
@@ -177,7 +183,7 @@ def _shifts(
 def _plane_design(
     data: Observations, excess_k: Float[np.ndarray, "vx vy vz"], basis: Float[np.ndarray, "lattice vx vz"]
 ) -> Float[np.ndarray, "blocks lattice"]:
-    """Plane temperatures of every block per kelvin of every coefficient."""
+    """Derivative of the planes' blocks in every coefficient."""
     if not data.planes:
         return np.zeros((0, len(basis)))
     fields = np.broadcast_to(basis[:, :, None, :], (len(basis), *excess_k.shape))

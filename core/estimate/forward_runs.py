@@ -1,4 +1,4 @@
-"""Marches of a room as a fit needs them: settled from nothing, restarted, and moved one parameter at a time."""
+"""Forward runs: marches of a room from rest, restarts with other parameters, and finite differences."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -23,32 +23,36 @@ from core.setting import check_range, setting
 
 Event = Callable[[dict[str, float]], object]
 
-# Steps of the finite differences, in prior deviations: beyond the march's own wobble, short of curvature. At
-# half a deviation the wobble outweighs what 1 % of a supply does, and the fit of a wrong supply does not end.
-# Walls that nobody knows may be off by half the supply's excess, and jets swerve: two deviations to one side
-# point where 0.25 do to 0.34-0.66 (cosine, shifts of case A), half of one to 0.77-0.94.
-# Air above a suspected heater is moved by one deviation, half of the heat that marches found there.
+# Steps of the finite differences, in prior standard deviations. A march is not quite steady: the step must change the
+# shifts by more than that unsteadiness does, and by less than the response's curvature. With half a deviation the
+# fit of a wrongly stated supply does not converge.
+# Unknown walls: a jet turns another way when a wall changes much. On room A the change of the shifts over two
+# deviations has a cosine of 0.34 to 0.66 with that over 0.25, and the change over half a deviation 0.77 to 0.94.
+# A suspected heater: one deviation, which is half of the heat that the marches found there.
 _DIFFERENCE, _WALLS_DIFFERENCE, _SUSPECTED_DIFFERENCE = 2.0, 0.3, 1.0
 
-# Steps a cell of the room's edge and second of the reference room, which takes half as many: a room whose
-# air turns out far faster than what was stated about it must not take hours.
+# Most time steps of a march, for each cell along the room's edge and each second. The reference room takes half as
+# many; the limit stops a march whose air is far faster than what was stated.
 _STEPS = 1.5
 
-# A jet of the reference room answers another supply within so long.
+# A jet in the reference room responds to a change of its supply within this time.
 _RESPONSE_S = 30.0
 
 
 @setting
 class RoomSettings:
-    """Grids, how long each march lasts (model seconds), and how often the images correct.
+    """Grids, lengths of the marches, and when the fit stops. Steps are in prior standard deviations.
 
-    The coarse room is corrected while a parameter moves by more than `coarse_step` prior deviations and
-    the misfit falls below `worthwhile` of what it was: a coarse grid's own error must not move the rest.
-    A Jacobian serves for `straight` prior deviations; where walls are unknown the fine room's is made again up
-    to `again` times, once parameters moved by `straight_walls`. The fine room's rounds end with a step below
-    `fine_step`; the longest march, `final_s`, follows. `wall_heat` multiplies what the balance, or the usual
-    guess, gives for the walls' heat coefficient. `log_viscosity_std` is how far the eddy viscosity may vary over
-    the room, in its logarithm; None for what the closure asks for (`core.estimate.prior`).
+    Times are those of the reference room; slower rooms march longer (`Room.turnover_ratio`).
+
+    `coarse_step`, `least_gain`: rounds on the coarse grid end when no parameter moves by more than `coarse_step`,
+    or when a round leaves more than `least_gain` of the misfit.
+    `jacobian_valid`: a Jacobian is computed anew once a parameter has moved this far from where it was computed.
+    `jacobian_valid_walls`, `renewals`: the same for the fine room where walls are unknown, and how often at most.
+    `fine_step`: rounds on the fine grid end when no parameter moves by more. A march of `final_s` follows.
+    `wall_heat`: multiplies the walls' heat coefficient from the heat balance, or the nominal one.
+    `log_viscosity_std`: prior deviation of the eddy viscosity's logarithm over the room; None takes the
+    closure's (`core.estimate.prior`).
     """
 
     cells: int = 48
@@ -76,7 +80,7 @@ class RoomSettings:
 
 
 class ForwardRun(eqx.Module):
-    """One march of a room: its parameters, how it went, and what measurements would see."""
+    """One march of a room: its parameters, its course, and its mean fields on vertices."""
 
     parameters: RoomParameters
     flow: March
@@ -84,14 +88,14 @@ class ForwardRun(eqx.Module):
 
 
 class Derivatives(eqx.Module):
-    """A room as it is, and with one parameter after the other moved by `steps` prior deviations."""
+    """Fields of one room, and of rooms with one parameter each moved by `steps` prior deviations."""
 
     start: RoomFields
     moved: list[RoomFields]
     steps: Float[np.ndarray, " active"]
 
     def per_deviation(self, read: Callable[[RoomFields], ArrayLike]) -> Float[np.ndarray, "active ..."]:
-        """Change of what `read` takes from a room, per prior deviation of each parameter."""
+        """Derivative of `read(fields)` in each parameter, per prior deviation."""
         before = np.asarray(read(self.start))
         changes = [
             (np.asarray(read(run)) - before) / step for run, step in zip(self.moved, self.steps, strict=True)
@@ -107,14 +111,14 @@ def run_as_stated(
     vertices: tuple[int, int, int],
     report: Event,
 ) -> ForwardRun:
-    """The coarse room as stated, marched from a measured profile or the leaving air's temperature."""
+    """The coarse room under the prior's mean, marched from still air."""
     model = coarse.model(prior.mean)
     flow = coarse.at_rest(model, first_profile_k(problem, coarse))
     return march_under(coarse, prior.mean, flow, settings.settle_s, vertices, report)
 
 
 def first_profile_k(problem: Problem, coarse: Room) -> Float[np.ndarray, " nz"]:
-    """Excess temperature of each layer to start from: a plane's, else what leaves, else half the supply's."""
+    """Excess temperature of still air over height: a plane's profile, else the outflow's, else half the supply's."""
     heights = coarse.grid.centres_m(2)
     ambient = problem.scene.air.ambient_temperature_k
     for plane in air_planes(problem):
@@ -139,9 +143,9 @@ def march_under(
     *,
     held_k: Float[np.ndarray, " layers"] | None = None,
 ) -> ForwardRun:
-    """March `flow` under these parameters and look at its mean; seconds are those of the reference room.
+    """March `flow` under these parameters; `seconds` are those of the reference room.
 
-    Layers, or the room, are kept at the mean excess temperatures `held_k` where those are given.
+    With `held_k` each layer, or the whole room, is held at that mean excess temperature (nudging).
     """
     model = where.model(parameters)
     flow = eqx.tree_at(lambda f: f.velocity, flow, set_normal(flow.velocity, model.boundary))
@@ -167,7 +171,7 @@ def perturbed(
     settings: RoomSettings,
     vertices: tuple[int, int, int],
 ) -> Derivatives:
-    """The settled room again, first as it is and then with one parameter moved after the other."""
+    """Restarts of the run `base`: one unchanged, then one for each parameter moved by its step."""
     sizes = differences(prior)
 
     def one(step: Float[np.ndarray, " active"]) -> RoomFields:
@@ -182,14 +186,14 @@ def perturbed(
 
 
 def differences(prior: Prior) -> Float[np.ndarray, " active"]:
-    """By how many prior deviations each parameter is moved to see what it does."""
+    """The finite-difference step of each parameter, in prior deviations."""
     walls = [bool(prior.unknown_walls()) and name.startswith(WALL_PARAMETERS) for name in prior.names()]
     sizes = np.where(walls, _WALLS_DIFFERENCE, _DIFFERENCE)
     return np.where(prior.suspected(), _SUSPECTED_DIFFERENCE, sizes)
 
 
 def other_closure(where: Room) -> str:
-    """The closure that a room is held against."""
+    """The closure that a room is compared with."""
     return "constant" if where.closure == "zero_equation" else "zero_equation"
 
 
@@ -200,7 +204,7 @@ def run_under_other_closure(
     settings: RoomSettings,
     vertices: tuple[int, int, int],
 ) -> RoomFields:
-    """The settled room again under another closure: what turbulence modelling leaves open."""
+    """A restart of the run `base` under another closure: the difference is an error of turbulence modelling."""
     last = base.flow.last
     flow = Flow(last.velocity, last.excess_k, last.pressure_m2_s2, None)
     another = room(where.scene, settings.coarse_cells, other_closure(where))

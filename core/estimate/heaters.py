@@ -1,7 +1,8 @@
-"""Heat coefficients of stated heaters, by marches: air above a warm one is a flow of its own, which no slope tells.
+"""Heat coefficients of stated heaters, by a line search over forward runs.
 
-What a surface of stated temperature gives off depends on its air: tables and programs differ by a factor of four. So
-the coarse room is marched with one heater after the other giving less, or more, until the images like it no better.
+The heat that a surface of stated temperature gives off is uncertain by a factor of four between tables and programs.
+The plume above it is far from linear in it, so derivatives do not help: the coarse room is marched with less heat, or
+with more, heater by heater, as long as the misfit with the data falls.
 """
 
 import numpy as np
@@ -13,8 +14,8 @@ from core.estimate.parameter_step import Vector, misfit_ratio
 from core.estimate.prior import Prior
 from core.room.forward import Room
 
-# How far a heater's coefficient is moved at most, in prior deviations of 0.6 in the logarithm.
-_FARTHEST = 2
+# Most steps of one prior deviation (0.6 in the logarithm) up or down.
+_MOST_STEPS = 2
 
 
 def heaters_by_march(
@@ -26,10 +27,10 @@ def heaters_by_march(
     settings: RoomSettings,
     report: Event,
 ) -> tuple[Vector, ForwardRun]:
-    """Parameters in prior deviations, zero but for heaters' coefficients, and the coarse room under them."""
+    """The heaters' coefficients in prior deviations, all other parameters zero, and the coarse room under them."""
 
     def climbed(n: int, way: float, vector: Vector, base: ForwardRun) -> tuple[Vector, ForwardRun]:
-        for _ in range(_FARTHEST):
+        for _ in range(_MOST_STEPS):
             moved = vector.copy()
             moved[n] += way
             where, flow = prior.parameters(moved), base.flow.last

@@ -1,11 +1,11 @@
-"""Gauss-Newton on a room's uncertain parameters, with a Jacobian from a coarser room.
+"""One Gauss-Newton step on a room's uncertain parameters, with a Jacobian from a coarser room.
 
     minimise  |d - f(q)|^2 / (s^2 + r^2) / c  +  sum log(1 + q^2 / nu) (nu + 1),  nu = 3
 
-q are parameters in units of their prior deviations. s is each datum's noise, r what the grid cannot
-represent, estimated from the residual of each kind of data; c counts neighbouring data that err together.
-The prior is Student's: a supply that was entered wrongly by many sigma is let go, and said. The closure's
-viscosity, which nobody enters, keeps a Gaussian one: else it is let go in a wrong supply's place.
+q are the parameters in units of their prior deviations. s is each datum's noise; r is the representation
+error, estimated for each kind of data; c is the number of neighbouring data whose errors are correlated.
+The prior is Student's t, so that the data can overrule an entry that is wrong by many deviations. The closure's
+viscosity, which nobody enters, has a Gaussian prior: with a Student's t it would move in place of a wrong supply.
 """
 
 import equinox as eqx
@@ -20,7 +20,7 @@ LONGEST_STEP = 3.0
 
 
 class Posterior(eqx.Module):
-    """Fitted parameters in prior units, their covariance, and the deviation of each datum."""
+    """Fitted parameters in prior deviations, their covariance, and the standard deviation of each datum."""
 
     vector: Float[np.ndarray, " active"]
     covariance: Float[np.ndarray, "active active"]
@@ -37,13 +37,14 @@ def gauss_newton(
     all_gaussian: bool = False,
     trust_radius: float | None = None,
 ) -> Posterior:
-    """One step from `vector`, where the data minus the prediction is `residual`.
+    """One step from `vector`, where `residual` is the data minus the prediction.
 
-    Few parameters' steps are cut one by one, which lets an entry that is far off move all the way. Many
-    that make up for one another would no longer do so: they are damped until none moves by more than `trust_radius`.
+    Without a `trust_radius` each parameter's step is limited by itself, so that one wrong entry may move far.
+    With it the whole step is damped until no parameter moves by more: where parameters compensate one another,
+    limiting them one by one would spoil that.
 
-    `gaussian` parameters keep a Gaussian prior; `all_gaussian` keeps that of all: for first steps, when the model is
-    still far from the data.
+    `gaussian` marks parameters with a Gaussian prior. `all_gaussian` gives all of them one: for the first steps,
+    while the model is still far from the data.
     """
     new, normal, prior = vector, np.eye(len(vector)), np.ones(len(vector))
     for _ in range(6):
@@ -56,7 +57,7 @@ def gauss_newton(
         else:
             new = vector + damped(normal, gradient, trust_radius)
     data = normal - np.diag(prior)
-    # A parameter that was let go is no more certain than its prior, were there no data; one near it no less.
+    # For the posterior every prior is Gaussian with unit deviation, also where the Student weight was small.
     return Posterior(new, np.linalg.inv(data + np.eye(len(new))), np.sqrt(variance))
 
 
@@ -79,11 +80,11 @@ def weighted_variance(
     *,
     far: bool = False,
 ) -> Float[np.ndarray, " data"]:
-    """Noise plus representation error of each datum, times the number of neighbours that err together.
+    """Noise plus representation error of each datum, times the number of correlated neighbours.
 
-    The representation error of a kind of data is what two grids differ by, or the misfit where that is less. `far`
-    from the truth the images' derivatives are no better than their misfit: all of it counts, so that they ask for no
-    more than they can report, and a stated supply or a thermometer holds against them.
+    The representation error of a kind of data is the difference of two grids, or the misfit if that is smaller.
+    With `far` the images' whole misfit counts as representation error: far from the truth their derivatives are
+    no better than that, and a stated supply or a thermometer must not yield to them.
     """
     total = np.zeros_like(variance)
     for g in np.unique(group):
@@ -96,6 +97,6 @@ def weighted_variance(
 
 
 def spread(values: Float[np.ndarray, " some"]) -> float:
-    """Rms with the largest twentieth left out: jets' edges must not hide the rest."""
+    """Rms without the largest twentieth: the edges of jets must not dominate."""
     size = np.sort(np.abs(values))
     return float(np.sqrt(np.mean(size[: max(1, int(0.95 * len(size)))] ** 2)))

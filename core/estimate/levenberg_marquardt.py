@@ -1,7 +1,8 @@
-"""The fine room's parameters where walls are unknown: a search for many numbers that are far off.
+"""The fit on the fine grid where walls are unknown: Levenberg-Marquardt with Broyden's updates.
 
-Each wall may be off by half the supply's excess, and walls, supply and closure make up for one another: derivatives
-of a coarse room mislead soon, and a step cut parameter by parameter ends in a corner.
+Here many parameters start far from the truth and compensate one another: each wall may be wrong by half the supply's
+excess temperature. Derivatives of a coarse room are valid for short steps only, so steps are damped, a room that fits
+worse is rejected, every forward run updates the Jacobian, and the Jacobian is computed anew from time to time.
 """
 
 from collections.abc import Callable
@@ -28,11 +29,10 @@ def fine_search(
     settings: RoomSettings,
     report: Event,
 ) -> tuple[Fit, Derivatives]:
-    """The fine room's parameters and best march, and the last derivatives.
+    """The parameters and forward run of least misfit, and the last derivatives.
 
-    Steps are damped, a room that is farther from the data than the one before is not gone on from, and every march
-    corrects the Jacobian. Derivatives are `renewed` after every other round that moved far, and where the old
-    ones have no more to say, `settings.renewals` times.
+    The derivatives are computed anew by `renewed`, at most `settings.renewals` times: on every other round if the
+    parameters have moved far, and when the rounds no longer gain.
     """
     linearised = np.zeros(len(prior.active()))
     best = Fit(Posterior(linearised, np.eye(len(linearised)), np.zeros(0)), first)
@@ -71,7 +71,7 @@ def searched(
     settings: RoomSettings,
     report: Event,
 ) -> Fit:
-    """One damped step from the best room, in which no parameter moves by more than `trust_radius`, and its march."""
+    """One damped step from the best room, and the forward run under the new parameters."""
     where, gaussian = best.posterior.vector, prior.gaussian()
     asked = corrected(
         where, best.room, data, jacobian, grid_difference, gaussian=gaussian, trust_radius=trust_radius

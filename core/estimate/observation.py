@@ -1,8 +1,8 @@
-"""What measurements say about a room, and what a flow would have shown: the same vector of data.
+"""The observation operator: measurements as one vector, and what a room would have shown in the same order.
 
-Shifts are pooled into blocks about two cells wide, since a coarse room cannot answer for less, and
-windows beside walls are left out: the thermal layer there is thinner than any cell. A plane of known T is
-pooled likewise. Every datum has its own noise; what the grid cannot represent is added by the fit.
+Shifts are pooled into blocks about two cells wide, the least that a coarse grid represents. Windows beside walls
+are left out: the thermal layer there is thinner than a cell. A plane of known T is pooled too. Every datum carries
+its noise; the fit adds the representation error.
 """
 
 import equinox as eqx
@@ -23,12 +23,12 @@ from core.room.vertices import RoomFields, linear_matrix
 from core.scene import Outlet, Scene
 
 _BLOCKS_ACROSS = 28
-# Groups of `Observations.values` whose neighbouring data err together.
+# Kinds of data in `Observations.values` whose neighbours have correlated errors.
 IMAGES, PLANES = 0, 1
 
 
 class ShiftBlocks(eqx.Module):
-    """Pooled shifts of one view: `row[w]` is the block of window w, -1 for a window left out."""
+    """Pooled shifts of one view: `row[w]` is the block of window w, or -1 if the window is left out."""
 
     operator: StraightRayOperator
     row: Int[np.ndarray, " windows"]
@@ -58,7 +58,7 @@ def _apply(
 def shift_blocks(
     scene: Scene, view: int, measured: ShiftMeasurement, vertices: tuple[int, int, int]
 ) -> ShiftBlocks | None:
-    """Pool one view's windows; None if no window sees the wall away from its edges."""
+    """Pool one view's windows; None if no window looks at the back wall away from its edges."""
     operator = build(scene, view, measured.centres_px, vertices, float(measured.window_px))
     block_px = _block_px(scene.room, operator, measured)
     cell = np.floor(measured.centres_px / block_px).astype(int)
@@ -87,7 +87,7 @@ def _block_px(room: Box, operator: StraightRayOperator, measured: ShiftMeasureme
 
 
 class Observations(eqx.Module):
-    """All data of a problem as one vector with a noise variance each; `group` names where each came from.
+    """All data of a problem as one vector.
 
     `outlets` are those with a thermometer, each with its place among the scene's outlets.
     """
@@ -102,7 +102,7 @@ class Observations(eqx.Module):
     def values(
         self,
     ) -> tuple[Float[np.ndarray, " data"], Float[np.ndarray, " data"], Int[np.ndarray, " data"]]:
-        """Data, variances and groups (0 shifts, 1 planes, 2 sensors' T, 3 sensors' u, 4 outlets)."""
+        """Data, noise variances, and kinds (0 shifts, 1 planes, 2 sensors' T, 3 sensors' u, 4 outlets)."""
         parts = [(b.displacement_px.ravel(), b.variance_px2.ravel(), 0) for b in self.shifts]
         ambient = self.scene.air.ambient_temperature_k
         parts += [
@@ -122,7 +122,7 @@ class Observations(eqx.Module):
         return values, variance, group
 
     def predicted(self, room: RoomFields) -> Float[np.ndarray, " data"]:
-        """What this room would have shown, in the order of `values`."""
+        """What measurements would show of this room, in the order of `values`."""
         refractivity = self.scene.air.excess_refractivity(jnp.asarray(room.excess_k, jnp.float32))
         parts = [b.predicted(refractivity).ravel() for b in self.shifts]
         parts.append(self.plane_values(room.excess_k))
@@ -134,11 +134,11 @@ class Observations(eqx.Module):
         return np.concatenate([np.asarray(p, float).ravel() for p in parts] or [np.zeros(0)])
 
     def plane_values(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " blocks"]:
-        """The planes' pooled temperatures in a room."""
+        """A room's temperature on the planes, pooled into their blocks."""
         return np.concatenate([np.zeros(0), *self._plane_parts(excess_k)])
 
     def plane_blocks(self) -> list[int]:
-        """How many blocks each plane is pooled into."""
+        """The number of blocks of each plane."""
         return [len(part) for part in self._plane_parts(np.zeros((2, 2, 2)))]
 
     def _plane_parts(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> list[Float[np.ndarray, " blocks"]]:
@@ -151,7 +151,7 @@ class Observations(eqx.Module):
 
 
 def observations(problem: Problem, vertices: tuple[int, int, int]) -> Observations:
-    """Pool a problem's measurements for rooms on `vertices`."""
+    """A problem's measurements, to be compared with rooms on `vertices`."""
     scene = problem.scene
     blocks = [shift_blocks(scene, n, shift, vertices) for n, shift in enumerate(problem.shifts)]
     return Observations(
@@ -167,7 +167,7 @@ def observations(problem: Problem, vertices: tuple[int, int, int]) -> Observatio
 def sample(
     field: Float[np.ndarray, "vx vy vz ..."], points_m: Float[np.ndarray, "points 3"], room: Box
 ) -> Float[np.ndarray, "points ..."]:
-    """Trilinear values of a vertex field at points; points outside take the wall's."""
+    """Trilinear interpolation of a vertex field; a point outside the room gets the value on the wall."""
     axes = [np.linspace(room.lower_m[a], room.upper_m[a], field.shape[a]) for a in AXES]
     clipped = np.clip(points_m, room.lower_m, room.upper_m)
     return RegularGridInterpolator(axes, np.asarray(field, float))(clipped)
@@ -176,7 +176,7 @@ def sample(
 def _on_plane(
     wall: Float[np.ndarray, "first second"], plane: PlaneData, room: Box
 ) -> Float[np.ndarray, "rows cols"]:
-    """A wall's vertex values at the plane's own vertices."""
+    """A wall's vertex values, interpolated to the plane's vertices."""
     first, second = face_of(plane.wall).along
     for axis, points, at in ((first, plane.first_m, 0), (second, plane.second_m, 1)):
         nodes = np.linspace(room.lower_m[axis], room.upper_m[axis], wall.shape[at])
@@ -187,7 +187,7 @@ def _on_plane(
 def _plane_pool(
     plane: PlaneData, values: Float[np.ndarray, "rows cols"], scene: Scene
 ) -> Float[np.ndarray, " blocks"]:
-    """Means over 6 x 12 blocks of the plane, openings left out: a profile with a little breadth."""
+    """Means over 6 x 12 blocks of the plane without its openings."""
     still = still_vertices(plane)
     rows, cols = (
         np.minimum((np.arange(n) * m) // n, m - 1) for n, m in zip(values.shape, (6, 12), strict=True)

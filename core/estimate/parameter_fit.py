@@ -1,8 +1,7 @@
-"""A room's parameters, corrected round by round: on a coarse grid while that pays, then on a fine one.
+"""The fit of a room's parameters: Gauss-Newton rounds on a coarse grid, then on a fine one.
 
-One restart a parameter says what each would change; the misfit with the data moves them by Gauss-Newton. Where
-walls are unknown, `core.estimate.levenberg_marquardt` does so. At last the room is held at
-the temperatures that measurements say.
+The Jacobian comes from one restart of the coarse room for each parameter. Where walls are unknown the rounds on the
+fine grid are those of `core.estimate.levenberg_marquardt`. The last marches hold the measured temperatures.
 """
 
 import equinox as eqx
@@ -19,14 +18,15 @@ from core.estimate.temperature_nudging import to_hold_k
 from core.problem import Problem
 from core.room.forward import Room
 
-# A correction that leaves more than this of the least misfit so far did harm: the room before it is kept. Below
-# it, the room may only not have settled yet; what is given back leaves no more than its own wobble above the least.
-# After so many rounds that take less than a hundredth off the misfit the derivatives have no more to say.
-_HARM, GAIN, PATIENCE, _WOBBLE = 1.5, 0.99, 2, 1.05
+# Ratios of a room's misfit to the least misfit so far. Above the first a step is rejected: smaller rises may come
+# from a march that is not quite steady yet. A round above the second has gained nothing; after `PATIENCE` of those
+# the rounds end. The room that is returned is below the last.
+_REJECTED, GAIN, _ACCEPTED = 1.5, 0.99, 1.05
+PATIENCE = 2
 
 
 class Background(eqx.Module):
-    """A room before any image, as stated: both grids settled, and the coarse one's derivatives."""
+    """The room as stated, before any image is used: forward runs on both grids, and the coarse one's derivatives."""
 
     problem: Problem
     coarse: Room
@@ -40,13 +40,11 @@ class Background(eqx.Module):
 def coarse_fit(
     background: Background, data: Observations, settings: RoomSettings, report: Event
 ) -> tuple[Vector, ForwardRun, Derivatives]:
-    """Parameters that the coarse room asks for, the room under them, and the runs of its Jacobian.
+    """Parameters fitted on the coarse grid, the forward run under them, and its derivatives.
 
-    What the coarse grid gets wrong is taken from the fine one under the stated parameters, so that it moves none.
-    Far from where it was made a Jacobian misleads: a new one is made after every `settings.jacobian_valid` prior
-    deviations.
-    What stated heaters give off is found before, by marches. Walls that nobody knows are left to the fine room: the
-    coarse one's own errors would move them.
+    The coarse grid's own error, its difference from the fine grid under the stated parameters, is taken off the
+    residual so that it moves no parameter. Heat coefficients of heaters are found first (`heaters_by_march`). Unknown
+    walls are not fitted here: the coarse grid's remaining error would move them.
     """
     coarse, prior, base, derivatives = (
         background.coarse,
@@ -62,7 +60,7 @@ def coarse_fit(
     if np.any(vector):
         derivatives, linearised = perturbed(coarse, prior, vector, base, settings, data.vertices), vector
     for n in range(settings.coarse_rounds if moves else 0):
-        # Where the parameters have moved, half of what was taken off may be wrong.
+        # The grids' difference changes as the parameters move: half of it counts as representation error.
         jacobian = derivatives.per_deviation(data.predicted).T
         new = corrected(
             vector,
@@ -91,13 +89,13 @@ def coarse_fit(
 
 
 class Fit(eqx.Module):
-    """Parameters that a fine room was marched under, what data leave open of them, and that room."""
+    """Fitted parameters with their posterior, and the forward run under them."""
 
     posterior: Posterior
     room: ForwardRun
 
     def with_posterior_of(self, other: "Fit") -> "Fit":
-        """The same room, with what data leave open by another's."""
+        """The same parameters and run, with the covariance of another step."""
         known = other.posterior
         return Fit(Posterior(self.posterior.vector, known.covariance, known.deviation), self.room)
 
@@ -112,9 +110,9 @@ def fine_fit(
     settings: RoomSettings,
     report: Event,
 ) -> Fit:
-    """The fine room's parameters and best march; as stated without images.
+    """Gauss-Newton rounds on the fine grid; without images the room as stated.
 
-    For few parameters that are nearly right: what is left to move is little more than a march's wobble.
+    For a few parameters that are nearly right: the last steps change little more than a march's unsteadiness does.
     """
     best = least = Fit(Posterior(vector, np.eye(len(vector)), np.zeros(0)), first)
     grid_difference = data.predicted(first.fields) - data.predicted(derivatives.start)
@@ -123,7 +121,7 @@ def fine_fit(
         new, left = fine_round(
             n, fine, prior, data, best, least, derivatives, grid_difference, settings, report
         )
-        if left > _HARM:
+        if left > _REJECTED:
             best = best.with_posterior_of(new)
             break
         step = farthest(new.posterior.vector, best.posterior.vector)
@@ -131,7 +129,7 @@ def fine_fit(
         least = new if left < 1.0 else least
         if step < settings.fine_step or stale == PATIENCE:
             break
-    if misfit_ratio(data, best.room, least.room) > _WOBBLE:
+    if misfit_ratio(data, best.room, least.room) > _ACCEPTED:
         best = least.with_posterior_of(best)
     return best
 
@@ -148,9 +146,9 @@ def fine_round(
     settings: RoomSettings,
     report: Event,
 ) -> tuple[Fit, float]:
-    """One step from the best room and its march, half of it where all did harm; its misfit over the least one.
+    """One step and the forward run under it, and its misfit over the least one; half the step if all is rejected.
 
-    The derivatives are a coarser room's, so a step may be too long.
+    The derivatives are a coarser grid's, so a step may be too long.
     """
     jacobian = derivatives.per_deviation(data.predicted).T
     asked = corrected(
@@ -166,7 +164,7 @@ def fine_round(
             misfit_ratio(data, tried, least.room),
         )
         report({"round": n + 2.0 - share, "misfit_left": left, **by_name(prior, vector)})
-        if left <= _HARM:
+        if left <= _REJECTED:
             break
     return new, left
 
@@ -180,9 +178,9 @@ def held_fit(
     settings: RoomSettings,
     report: Event,
 ) -> ForwardRun:
-    """The room `before` kept at the mean temperatures that measurements say, the longest march last.
+    """The room `before`, marched on while held at the measured mean temperatures; the longest march is the last.
 
-    A level, or a profile, that parameters miss bends the jets: a room that has it right has the better velocity.
+    A wrong level, or profile, of T gives jets the wrong buoyancy. If the held room fits worse, `before` is returned.
     """
     held, left = before, 1.0
     for seconds in (settings.refine_s, settings.final_s):
@@ -192,4 +190,4 @@ def held_fit(
         )
         left = misfit_ratio(data, held, before)
         report({"held_s": seconds, "misfit_left": left})
-    return before if left > _WOBBLE else held
+    return before if left > _ACCEPTED else held

@@ -1,4 +1,4 @@
-"""One step of a room's fit: where parameters go next by the misfit of a march, and what that march taught."""
+"""Parts of the fit that all rounds share: the step, the misfit, the secant update of the Jacobian."""
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -24,9 +24,9 @@ def corrected(
     all_gaussian: bool = False,
     trust_radius: float | None = None,
 ) -> Posterior:
-    """One Gauss-Newton step from `vector` by the misfit of `best`, `offset` added to what it shows.
+    """One Gauss-Newton step from `vector`, by the residual of the run `best`; `offset` is added to its prediction.
 
-    One that may not trust_radius farther than `trust_radius` is a search's, still far from the truth.
+    With a `trust_radius` the room counts as far from the truth (`weighted_variance`).
     """
     values, variance, group = data.values()
     residual = values - data.predicted(best.fields) - offset
@@ -39,7 +39,7 @@ def corrected(
 def misfit_ratio(
     data: Observations, new: ForwardRun, old: ForwardRun, offset: Float[np.ndarray, " data"] | float = 0.0
 ) -> float:
-    """Rms misfit of one attempt over another's, each kind of data weighted by the old one's."""
+    """Misfit of a run over that of another, each datum weighted by its noise and the old run's residual."""
     values, variance, group = data.values()
     after, before = (values - data.predicted(a.fields) - offset for a in (new, old))
     weights = weighted_variance(variance, group, before, before)
@@ -57,5 +57,5 @@ def by_name(prior: Prior, vector: Vector) -> dict[str, float]:
 
 
 def secant(jacobian: Jacobian, moved: Vector, change: Float[np.ndarray, " data"]) -> Jacobian:
-    """The Jacobian that agrees with what a move did, as near to the old one as can be (Broyden 1965)."""
+    """Broyden's update (1965): the Jacobian nearest to the old one that gives `change` for the step `moved`."""
     return jacobian + np.outer(change - jacobian @ moved, moved) / max(float(moved @ moved), 1e-12)

@@ -1,8 +1,8 @@
-"""Openings that nobody stated, read off a wall's plane of known velocity.
+"""Inlets and outlets that nobody stated, found in a plane of known velocity on a wall.
 
-A plane field says how fast air comes in and where it leaves, not where the patches end: vertices smear
-their edges over one spacing. A patch is the box of the vertices that carry more than half of the fastest
-flow of their kind, its edges where the flow falls to half; the volume flow through it is the plane's own.
+The vertices smear an opening's edges over one spacing. Its patch is the rectangle around the vertices with more
+than half of the fastest flow through it, with the edges where the flow falls to half. The volume flow through the
+patch is that of the plane.
 """
 
 from dataclasses import replace
@@ -17,14 +17,14 @@ from core.known import share_area, stated_walls
 from core.problem import PlaneData, Problem
 from core.scene import Heater, Inlet, Outlet, Patch
 
-# Patches slower than this share of the fastest flow through the plane are not reported from rounding.
+# Flow below this share of the plane's fastest is taken for rounding, not for an opening.
 _SLOWEST = 0.05
-# Air slower than this share of the fastest in the plane is a wall's.
+# Vertices with less than this share of the plane's fastest air lie on wall.
 _STILL = 0.02
 
 
 def with_plane_openings(problem: Problem) -> Problem:
-    """The problem with its planes' openings stated, where the scene states no inlet, outlet or heater."""
+    """The problem with the openings of its planes added, if the scene states no inlet, outlet or heater."""
     if any(isinstance(b, Inlet | Outlet | Heater) for b in problem.scene.boundary):
         return problem
     found = tuple(opening for plane in problem.planes for opening in plane_openings(plane))
@@ -38,7 +38,7 @@ def with_plane_openings(problem: Problem) -> Problem:
 
 
 def plane_openings(plane: PlaneData) -> list[Inlet | Outlet]:
-    """Inlets and outlets of one plane, each with its flow-weighted mean temperature and velocity."""
+    """Inlets and outlets of one plane, with their flow-weighted mean temperature and velocity."""
     face = face_of(plane.wall)
     inward = plane.velocity_m_s[..., face.axis] * face.inward
     found: list[Inlet | Outlet] = []
@@ -54,14 +54,14 @@ def plane_openings(plane: PlaneData) -> list[Inlet | Outlet]:
 
 
 def air_planes(problem: Problem) -> list[PlaneData]:
-    """Planes of side walls that have the temperature of the air beside them: not those held at their own."""
+    """Planes on side walls whose temperature is not stated: these have the temperature of the air beside them."""
     walls = stated_walls(problem.scene)
     held = {name for name, wall in walls.items() if wall is not None and wall.thermal == "temperature"}
     return [plane for plane in problem.planes if face_of(plane.wall).axis != 2 and plane.wall not in held]
 
 
 def still_vertices(plane: PlaneData) -> Bool[np.ndarray, "first second"]:
-    """Vertices of the plane that lie on wall, away from its ends and openings; all inner ones if none do."""
+    """Inner vertices of the plane that lie on wall, not in an opening; all inner ones if there are none such."""
     inner = np.zeros(plane.temperature_k.shape, bool)
     inner[1:-1, 1:-1] = True
     speed = np.abs(plane.velocity_m_s).max(axis=2)
@@ -72,7 +72,7 @@ def still_vertices(plane: PlaneData) -> Bool[np.ndarray, "first second"]:
 def _opening(
     plane: PlaneData, through_m_s: Float[np.ndarray, "first second"], *, supplies: bool
 ) -> Inlet | Outlet:
-    """One patch that carries `through_m_s`."""
+    """The opening with the flow `through_m_s`."""
     core = through_m_s > 0.5 * through_m_s.max()
     (f0, f1), (s0, s1) = (
         _extent(axis_m, through_m_s.max(axis=1 - n), core.any(axis=1 - n))

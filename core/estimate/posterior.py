@@ -1,4 +1,4 @@
-"""What a fitted room says: T, p and u with the last correction, their deviations, and sentences."""
+"""The result of a fit: T with its last correction, p, u, their standard deviations, and sentences."""
 
 import equinox as eqx
 import numpy as np
@@ -11,28 +11,35 @@ from core.estimate.forward_runs import Derivatives, ForwardRun
 from core.estimate.least_squares import Posterior
 from core.estimate.observation import IMAGES, Observations
 from core.estimate.prior import Prior
-from core.estimate.temperature_nudging import departure, free_vertices, last_correction, layer_means, unheld
+from core.estimate.temperature_nudging import (
+    departure,
+    free_vertices,
+    last_correction,
+    layer_means,
+    without_nudging,
+)
 from core.estimate.uncertainty import Deviation, Represented, deviation
 from core.problem import Problem
 from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
 from core.room.vertices import RoomFields
 
-# Taken for the share of the images that is left unexplained where there are none.
+# Unexplained share of the images that is assumed where there are no images.
 _UNSEEN_SHARE = 0.3
-# What grid, closure and scale leave open (a, c and b of `core.estimate.uncertainty`).
+# Shares a, c and b of `core.estimate.uncertainty`.
 _SHARES = {"excess_k": (0.1, 0.3, 1.0), "pressure_m2_s2": (0.3, 1.0, 1.0), "velocity_m_s": (0.2, 5.0, 0.3)}
-# A level that thermometers moved is doubted by half of that: they stand in a few places, of which the room was wrong.
+# If the thermometers moved the level of T, half of that move is added to its standard deviation: they stand in a few
+# places, and the model was wrong there.
 _DOUBT = 0.5
-# Of c, where one guessed viscosity stands for all air: images that a map of it explains do not make it the right one.
+# Factors on c where one viscosity was guessed for all air: a map of it that explains the images may still be wrong.
 _GUESSED_VISCOSITY = {"excess_k": 20.0, "pressure_m2_s2": 1.0, "velocity_m_s": 2.0}
 
 
 class Analysis(eqx.Module):
-    """Everything that a solve leaves behind: what a solution and its deviations are made of.
+    """A fitted room with everything that its solution and standard deviations are made of.
 
-    `coarse`, `first` (the fine room) and `other` (another closure) share their parameters. `before` is the room
-    that fitted parameters alone make, `best` the same with its level, or profile, held.
+    `coarse`, `first` (on the fine grid) and `other` (another closure) are under the same parameters. `before` is the
+    run under the fitted parameters; `best` is the same run held at the measured level, or profile, of T.
     """
 
     problem: Problem
@@ -51,11 +58,11 @@ class Analysis(eqx.Module):
 def solution(
     analysis: Analysis, seconds: float, *, use_images: bool, notes: tuple[str, ...] = ()
 ) -> Solution:
-    """The room as a result, with the temperature's last correction, deviations and sentences after `notes`."""
+    """The result: fields, standard deviations, and sentences after `notes`; T with its last correction."""
     best, box, problem = analysis.best, analysis.problem.scene.room, analysis.problem
     local_k = departure(best.fields.excess_k)
     free = free_vertices(analysis.layout, best.fields.excess_k.shape)
-    start = unheld(best.fields, analysis.before.fields, analysis.data, analysis.prior, free)
+    start = without_nudging(best.fields, analysis.before.fields, analysis.data, analysis.prior, free)
     change = last_correction(analysis.data, analysis.prior, analysis.derivatives, start)
     x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(start.excess_k.shape))
     excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
@@ -64,7 +71,7 @@ def solution(
         (v[:, None, :] + (_DOUBT * moved_k) ** 2) * free
         for v in (change.prior_variance_k2, change.variance_k2)
     )
-    bent = bent_m4_s4(problem, z, before), bent_m4_s4(problem, z, after)
+    bent = hydrostatic_variance_m4_s4(problem, z, before), hydrostatic_variance_m4_s4(problem, z, after)
     share = unexplained(analysis.data, best.fields)
     temperature = _deviation(analysis, "excess_k", local_k, share, (before, after))
     pressure = _deviation(analysis, "pressure_m2_s2", departure(best.fields.pressure_m2_s2), share, bent)
@@ -74,7 +81,7 @@ def solution(
         y,
         z,
         problem.scene.air.ambient_temperature_k + excess,
-        best.fields.pressure_m2_s2 + carried_m2_s2(problem, z, excess - best.fields.excess_k),
+        best.fields.pressure_m2_s2 + hydrostatic_m2_s2(problem, z, excess - best.fields.excess_k),
         best.fields.velocity_m_s,
         temperature.std,
         pressure.std,
@@ -87,7 +94,7 @@ def solution(
 
 
 def sentences(analysis: Analysis, share: float) -> list[str]:
-    """Everything worth telling the operator; `share` of the images is left unexplained."""
+    """Sentences for the operator; `share` of the images is left unexplained."""
     parameters = analysis.best.parameters
     inflow = np.asarray(analysis.layout.inflow_m3_s(parameters), float)
     return [
@@ -107,13 +114,13 @@ def outflow_excess_k(analysis: Analysis) -> float:
 
 
 def held_k_m3_s(analysis: Analysis) -> float:
-    """What it took to hold the temperatures that measurements say, over the whole room."""
+    """The heat source, over rho c and the whole room, that held the measured temperatures."""
     box = analysis.problem.scene.room
     return (analysis.best.flow.held_k_s or 0.0) * float(np.prod(box.size_m))
 
 
 def unexplained(data: Observations, fields: RoomFields) -> float:
-    """Share (rms) of the measured shifts that a room does not explain."""
+    """Share (rms) of the measured shifts that these fields leave unexplained."""
     values, _, group = data.values()
     shifts = group == IMAGES
     if not shifts.any():
@@ -122,19 +129,19 @@ def unexplained(data: Observations, fields: RoomFields) -> float:
     return float(np.linalg.norm(left) / max(float(np.linalg.norm(values[shifts])), 1e-30))
 
 
-def carried_m2_s2(
+def hydrostatic_m2_s2(
     problem: Problem, z_m: Float[np.ndarray, " vz"], warmer_k: Float[np.ndarray, "vx vy vz"]
 ) -> Float[np.ndarray, " vz"]:
-    """Pressure over height that carries air which is warmer by this: dp/dz = g beta dT, its mean at each height."""
+    """Hydrostatic pressure of a change of T: dp/dz = g beta dT, from the mean change at each height."""
     buoyancy = GRAVITY_M_S2 * problem.scene.air.expansion_per_k * warmer_k.mean((0, 1))
     return cumulative_trapezoid(buoyancy, z_m, initial=0.0)
 
 
-def bent_m4_s4(
+def hydrostatic_variance_m4_s4(
     problem: Problem, z_m: Float[np.ndarray, " vz"], variance_k2: Float[np.ndarray, "vx vy vz"]
 ) -> Float[np.ndarray, "vx vy vz"]:
-    """Variance of p about its mean where the air at all heights is too warm together, with this variance."""
-    carried = carried_m2_s2(problem, z_m, np.sqrt(variance_k2))
+    """Variance of p, about its mean over height, from an error of T that is the same sign at all heights."""
+    carried = hydrostatic_m2_s2(problem, z_m, np.sqrt(variance_k2))
     return np.broadcast_to(np.square(carried - carried.mean()), variance_k2.shape)
 
 
@@ -158,7 +165,7 @@ def _deviation(
         # Closures pass walls' heat differently; the level that follows is measured.
         between[1] = between[1] - between[1].mean((0, 1))
         if analysis.data.planes:
-            # The profile of height is measured by the plane; only departures from it are the grid's.
+            # The plane measures the profile over height; only departures from it are errors of the grid.
             between[0] = between[0] - between[0].mean((0, 1))
     a, c, b = _SHARES[name]
     if float(analysis.prior.std.log_viscosity.max()) > 0:

@@ -1,10 +1,10 @@
-"""What a scene states about a room as parameters, and how far each may be wrong.
+"""The prior: the room's parameters as stated, and their standard deviations.
 
-Supply temperature and flow carry the operator's standard deviations, but at least 2 % of the contrast and
-3 % of the flow, since nobody's model of a supply is better. Heat coefficients of walls are a guess: free
-convection gives 1 to 3 W/m2K; where a thermometer tells what leaves, their common level follows from the
-heat balance. An unknown wall has the nominal coefficient and a temperature of its own, since the air's
-temperature is linear in it: that of the air is an adiabatic wall. What leaves says their mean.
+Supply: the operator's values and deviations, but at least 2 % of the contrast and 3 % of the flow, since a supply's
+model is no better than that. Walls of stated temperature: one heat coefficient, from the heat balance if the outflow
+temperature is measured, else the nominal one of free convection (1 to 3 W/m2K). Unknown walls: the nominal
+coefficient, and a temperature each, in which the air's temperature is linear. A wall at the temperature of the air is
+adiabatic. The mean of the unknown temperatures comes from the heat balance.
 """
 
 import equinox as eqx
@@ -26,22 +26,25 @@ from core.room.boundary_conditions import RoomLayout, RoomParameters, SuspectedH
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.scene import Heater, Inlet
 
-# Walls' heat coefficients are right within a factor of two (one sigma 0.6 in the logarithm).
+# Walls' heat coefficients are known within a factor of two: one sigma is 0.6 in the logarithm.
 _WALL_HEAT_STD = 0.6
-# Where walls' temperatures are free, their common coefficient is nearly the same degree of freedom.
+# With unknown walls the common coefficient is nearly the same degree of freedom as their temperatures.
 _SHARED_HEAT_STD = 0.3
-# Spread of unknown walls: of their distance from the air, and at least of the supply's contrast.
+# Deviation of an unknown wall's temperature: this share of its distance from the air, and at least that of the
+# contrast.
 _WALL_SHARE, _LEAST_WALL_SHARE = 1.0, 0.2
+# Heat coefficient of a heater [m/s], 3 W/m2K over rho c, and one sigma of its logarithm.
 _HEATER_HEAT_M_S, _HEATER_HEAT_STD = 2.5e-3, 0.6
-# A viscosity that the images may choose absorbs every other misfit and spoils u: k-epsilon keeps its own.
+# A freely fitted viscosity would absorb every other error and make the velocity worse: k-epsilon's is kept close.
 _CLOSURE_STD, _SIMPLE_CLOSURE_STD = 0.12, 0.25
-# One viscosity for all air is no room's: where nobody stated its value either, the images may choose it from place
-# to place, within a factor of 4.5 (one sigma).
+# No room has one viscosity everywhere. If one is asked for without a value, it is fitted as a coarse lattice, within
+# a factor of 4.5 (one sigma).
 _GUESSED_VISCOSITY_STD = 1.5
+# Least deviations of a supply: of its temperature, as a share of the contrast, and of its flow.
 _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
-# Where walls are unknown their temperatures and their common heat coefficient are much the same freedom.
+# Parameters of the walls, by the beginnings of their names.
 WALL_PARAMETERS = ("wall_excess_k", "log_heat")
-# Walls that a view looks through, and onto: where both are unknown they are fitted as one.
+# The camera looks through the first wall onto the second: if both are unknown they are fitted as one.
 FITTED_AS_ONE = ("y_min", "y_max")
 _NEAR, _FAR = (WALLS.index(name) for name in FITTED_AS_ONE)
 
@@ -49,8 +52,8 @@ _NEAR, _FAR = (WALLS.index(name) for name in FITTED_AS_ONE)
 class Prior(eqx.Module):
     """Mean and standard deviation of every parameter; a parameter of zero deviation is not fitted.
 
-    Where walls' heat follows from the balance of the stated supply and a thermometer in what leaves
-    (`leaving_excess_k`), another supply moves it along: the thermometer stays.
+    If the walls' heat coefficient comes from the heat balance (`leaving_excess_k` is not None), it follows the
+    supply's parameters, so that the balance with the measured outflow temperature holds.
     """
 
     mean: RoomParameters
@@ -71,11 +74,11 @@ class Prior(eqx.Module):
         return [name for name, std_k in zip(WALLS, spread_k, strict=True) if std_k > 0]
 
     def front_and_back_tied(self) -> bool:
-        """Whether the walls before and behind the air are fitted as one: rays through both report them not apart."""
+        """Whether y_min and y_max are fitted as one: every ray passes both, so images do not distinguish them."""
         return set(FITTED_AS_ONE) <= set(self.unknown_walls())
 
     def parameters(self, vector: Float[np.ndarray, " active"]) -> RoomParameters:
-        """Parameters from fitted ones in units of their deviations from the mean."""
+        """All parameters for a vector of the fitted ones, which is in prior deviations from the mean."""
         mean, restore = ravel_pytree(self.mean)
         std = np.asarray(ravel_pytree(self.std)[0], float)
         chosen = self.active()
@@ -89,7 +92,7 @@ class Prior(eqx.Module):
         return eqx.tree_at(lambda p: p.wall_log_heat, found, moved)
 
     def _balanced(self, found: RoomParameters) -> float:
-        """Logarithm of what the supply brings over what it was stated to bring, beyond what leaves."""
+        """Logarithm of the heat that the supply brings beyond the outflow's, over the same as stated."""
         if self.leaving_excess_k is None:
             return 0.0
         flow = self.supply_m3_s * np.exp(np.asarray(found.inlet_log_flow, float))
@@ -108,14 +111,14 @@ class Prior(eqx.Module):
         return [named[n] for n in self.active()]
 
     def suspected(self) -> Bool[np.ndarray, " active"]:
-        """Which fitted parameters are the heat of heaters that nobody stated: those without a coefficient."""
+        """Which fitted parameters are the heat of suspected heaters: those without a fitted coefficient."""
         bare = {f"heater_excess_k[{n}]" for n in np.flatnonzero(np.asarray(self.std.heater_log_heat) == 0)}
         return np.array([name in bare for name in self.names()], bool)
 
     def gaussian(self) -> Bool[np.ndarray, " active"]:
-        """Which fitted parameters nobody entered, so that nobody did so wrongly: the closure, unknown walls.
+        """Which fitted parameters have a Gaussian prior: those that nobody entered (closure, unknown walls).
 
-        Where heat is suspected that nobody stated, nothing else is taken for wrong beside it.
+        If a heater is suspected, its heat alone has a Student's prior, and everything else a Gaussian one.
         """
         suspected = self.suspected()
         if suspected.any():
@@ -127,7 +130,7 @@ class Prior(eqx.Module):
 def room_prior(
     problem: Problem, layout: RoomLayout, *, log_viscosity_std: float | None = None, wall_heat: float = 1.0
 ) -> Prior:
-    """Parameters as stated, and their spread; `wall_heat` multiplies every wall's heat coefficient."""
+    """The prior of a problem; `wall_heat` multiplies the walls' heat coefficient."""
     scene = problem.scene
     ambient = scene.air.ambient_temperature_k
     inlets = [b for b in scene.boundary if isinstance(b, Inlet)]

@@ -1,8 +1,9 @@
-"""What measurements say of a fitted room's level, and the temperatures that its last marches are held at.
+"""Nudging: the last marches hold the level of T, or its profile, at what the measurements say.
 
-Parameters leave some of the level, and where walls are unknown of the profile; the correction of T by all data says
-how much. A room that is kept there has its jets bent by the right buoyancy. The correction itself stays one of the
-room before: it is not asked for twice.
+The fitted parameters may leave an error in the level of T and, where walls are unknown, in its profile over height.
+The correction of T (`core.estimate.discrepancy`) measures that error. Held at the corrected temperatures, the room
+gives its jets the right buoyancy. For the final correction the held room is set back to the level it had before
+(`without_nudging`); else the same error would be corrected twice.
 """
 
 import numpy as np
@@ -17,7 +18,7 @@ from core.room.boundary_conditions import RoomLayout
 from core.room.room_grid import AXES
 from core.room.vertices import RoomFields, cell_matrix
 
-# Air of one temperature departs from nothing, yet images may say otherwise.
+# Least departure from the profile: air of one temperature has none, but its correction needs a prior.
 _LEAST_DEPARTURE_K = 1e-3
 
 
@@ -29,12 +30,12 @@ def to_hold_k(
     before: ForwardRun,
     layout: RoomLayout,
 ) -> Float[np.ndarray, " layers"]:
-    """Corrected mean excess temperature of the room `before` it was held; `held` says its departures.
+    """The mean excess temperature to hold: that of `before` with the correction; departures are those of `held`.
 
-    Where walls are unknown that of every layer of cells: then the room's own profile is no better than they.
+    One for each layer of cells where walls are unknown, since the model's profile depends on them; else one.
     """
     free = free_vertices(layout, held.fields.excess_k.shape)
-    start = unheld(held.fields, before.fields, data, prior, free)
+    start = without_nudging(held.fields, before.fields, data, prior, free)
     change = last_correction(data, prior, derivatives, start).excess_k[:, None, :] * free
     warmer_k = layer_means(start.excess_k + change) - layer_means(held.fields.excess_k)
     faces_m = layout.grid.faces_m(2)
@@ -44,14 +45,14 @@ def to_hold_k(
     return layers_k if prior.unknown_walls() else layers_k.mean(keepdims=True)
 
 
-def unheld(
+def without_nudging(
     held: RoomFields,
     before: RoomFields,
     data: Observations,
     prior: Prior,
     free: Float[np.ndarray, "vx vy vz"],
 ) -> RoomFields:
-    """A room that was held, at the level (or profile) it had before: a correction is of what the model says."""
+    """The held room, set back to the level (or profile) that it had before it was held."""
     shift_k = layer_means(held.excess_k) - layer_means(before.excess_k)
     if not prior.unknown_walls():
         shift_k = np.full_like(shift_k, shift_k.mean())
@@ -68,7 +69,7 @@ def unheld(
 def last_correction(
     data: Observations, prior: Prior, derivatives: Derivatives, fields: RoomFields
 ) -> Correction:
-    """The correction of T by all that parameters leave unexplained."""
+    """The correction of T for these fields (`core.estimate.discrepancy`)."""
     own_k = max(departure(fields.excess_k), _LEAST_DEPARTURE_K)
     level_k = max(own_k, level_std_k(derivatives))
     residual = data.values()[0] - data.predicted(fields)
@@ -76,12 +77,12 @@ def last_correction(
 
 
 def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"]:
-    """Mean of a field at each height, side walls left out."""
+    """Mean of a field at each height, without the side walls."""
     return field[1:-1, 1:-1].mean((0, 1))
 
 
 def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.ndarray, "vx vy vz"]:
-    """1 where a vertex is not on a wall, or heater, of stated temperature."""
+    """1 at each vertex, but 0 on walls and heaters of stated temperature."""
     free = np.ones(shape)
     for wall in np.flatnonzero(layout.held):
         free[_plane(face_of(WALLS[wall]))] = 0.0
@@ -96,11 +97,11 @@ def _plane(face: Face) -> tuple[slice | int, ...]:
 
 
 def level_std_k(derivatives: Derivatives) -> float:
-    """How far what was stated leaves the level open: a room's temperature balances what nobody knows exactly."""
+    """Prior deviation of the level: the parameters' prior deviations, through the derivatives of mean T."""
     return float(np.linalg.norm(derivatives.per_deviation(lambda run: run.excess_k.mean())))
 
 
 def departure(field: Float[np.ndarray, "vx vy vz"]) -> float:
-    """Rms of a field's departure from its profile of height, walls left out."""
+    """Rms departure of a field from its mean at each height, without the walls."""
     field = field[1:-1, 1:-1, 1:-1]
     return float(np.sqrt(np.mean((field - field.mean((0, 1))) ** 2)))

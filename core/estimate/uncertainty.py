@@ -2,12 +2,11 @@
 
     var = D C D^T + (a |f_fine - f_coarse| + c m |f_other - f_coarse| + b m s)^2 + var_correction
 
-D holds the fields' derivatives in the fitted parameters and C their posterior covariance. The second term
-is what a grid and a closure cannot represent, smoothed: two grids differ by about what the finer one still
-lacks, two closures by about what either does, and both matter by the share m of the images that the room
-leaves unexplained. s is the field's own scale. a, b and c were set so that 95 % intervals hold: those of u and p on
-two reference rooms, and looked at on rooms of other closures; those of T on six rooms, four of other closures or
-with a plume.
+D holds the fields' derivatives in the fitted parameters, and C is their posterior covariance. The second term is
+the representation error of grid and closure: two grids differ by about the error of the finer one, and two closures
+by about the error of either. Both differences are smoothed. m is the share of the images that the room leaves
+unexplained, and s the rms size of the field. a, b and c were set so that 95 % intervals hold: for u and p on two
+reference rooms (A and C), for T on six rooms, four of which have another closure or a plume.
 """
 
 import equinox as eqx
@@ -17,11 +16,12 @@ from scipy import ndimage
 
 Field = Float[np.ndarray, "vx vy vz ..."]
 
+# Standard deviation of the smoothing [vertices].
 _SMOOTH_VERTICES = 2.5
 
 
 class Represented(eqx.Module):
-    """What grid and closure leave open: two differences of fields, the scale s, and the shares a, c m, b m."""
+    """Representation error: differences of two grids and of two closures, the scale s, and a, c m, b m."""
 
     grid: Field
     closure: Field
@@ -51,15 +51,15 @@ def deviation(
     represented: Represented,
     extra: tuple[Field | float, Field | float] = (0.0, 0.0),
 ) -> Deviation:
-    """Combine the three terms; parameters are in units of their prior deviations.
+    """Combine the three terms; derivatives are per prior deviation.
 
-    `extra` are a correction's variances before and after the data.
+    `extra` are the correction's prior and posterior variances.
     """
     roots = np.linalg.cholesky(covariance) if len(derivatives) else np.zeros((0, 0))
     stacked = np.stack(derivatives) if derivatives else np.zeros((0, *represented.grid.shape))
     after = np.sum(np.tensordot(roots.T, stacked, axes=1) ** 2, axis=0) + extra[1]
     before = np.sum(stacked**2, axis=0) + extra[0]
-    # Where nothing is open, nothing is left to inform.
+    # Where nothing is uncertain, `informed` is 0.
     left = represented.deviation() ** 2 + np.finfo(np.float32).tiny
     informed = 1.0 - (after + left) / (before + left)
     return Deviation(np.sqrt(after + left), np.clip(informed, 0.0, 1.0))

@@ -1,11 +1,10 @@
-"""Heat that nobody stated: a warm strip of the floor, where the images ask for one.
+"""A heat source that nobody stated: find the strip of floor that explains the images best.
 
-Where walls are unknown, so is whether a heater stands on one. A room that no wall's temperature and no supply brings
-near the images is marched with a panel on one strip of floor after the other, below the middle of the view, then
-half-way to the neighbours of the best, each warmer until the images like it no better: where the air rises they
-show, how deep in the room they do not. Air above a heater is another flow than without, so marches are compared and
-no derivatives. The best strip is given to the fit as a heater whose heat is half known, between two neighbours that
-may share it.
+The coarse room is marched with a heated panel on each of five strips of floor in turn, and then on the two strips
+half-way to the neighbours of the best one. Each panel is made warmer as long as the misfit falls. Forward runs are
+compared, not derivatives, since a plume is far from linear in its heat. One view shows where along x the air rises
+but not how deep in the room, so the strips lie in the middle of the room's depth. The best strip enters the fit as
+a heater with a prior deviation of half its heat, and so do its neighbours on both sides.
 """
 
 from collections.abc import Sequence
@@ -28,18 +27,21 @@ from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.room.forward import Room, room
 from core.scene import Heater, Inlet, Outlet, Patch
 
+# Strips along x, and their depth along y as a share of the room's.
 _STRIPS, _DEPTH_SHARE = 5, 0.2
-# At a heater's coefficient 20 K are some 60 W/m2, over about half a square metre: from a lamp to a radiator.
+# Temperatures above the air that are tried. At a heater's usual coefficient 20 K give some 60 W/m2 over about half a
+# square metre: the range is from a lamp to a radiator.
 _LADDER_K = (15.0, 30.0, 60.0, 120.0)
+# Prior deviation of the found heat, as a share of it.
 _STD_SHARE = 0.5
-# A strip is tried by a fit where it alone leaves less than this of the misfit of the room without it.
+# A strip enters a fit if the room with it has less than this share of the misfit of the room without.
 _WORTHWHILE = 0.8
 
 
 def with_suspected_heat(
     background: Background, data: Observations, settings: RoomSettings, report: Event
 ) -> Problem | None:
-    """The problem with the strip of floor whose heat the images like best, and its neighbours; None for no strip."""
+    """The problem with the best strip and its neighbours as heaters; None if no strip helps enough."""
     strips = floor_strips(background.problem)
     climbs = climbed_each(strips, background, data, settings)
     if min((climb.left for climb in climbs), default=1.0) > _WORTHWHILE:
@@ -58,7 +60,7 @@ def with_suspected_heat(
 
 
 class Climb(NamedTuple):
-    """By how many kelvin a strip was warm where it left least of the misfit of the room without, and how much."""
+    """The best heat of a strip, and its misfit as a share of that of the room without it."""
 
     left: float
     heat_k: float
@@ -68,7 +70,7 @@ class Climb(NamedTuple):
 def climbed_each(
     strips: Sequence[SuspectedHeater], background: Background, data: Observations, settings: RoomSettings
 ) -> list[Climb]:
-    """Every strip by itself."""
+    """The best heat of each strip, each tried by itself."""
     cold = with_heaters(background.problem, strips)
     coarse = room(cold.scene, settings.coarse_cells, background.coarse.closure)
     mean = room_prior(cold, coarse.layout).mean
@@ -89,7 +91,7 @@ def climbed(
     data: Observations,
     settings: RoomSettings,
 ) -> tuple[float, float]:
-    """Least misfit with this heater warm, over that of the room without, and by how many kelvin it was warm."""
+    """Least misfit with this heater, over that of the room without it, and its temperature above the air."""
     least, best_k, flow = np.inf, 0.0, background.base.flow.last
     for heat_k in _LADDER_K:
         warm = eqx.tree_at(lambda p: p.heater_excess_k, mean, mean.heater_excess_k.at[heater].add(heat_k))
@@ -102,7 +104,10 @@ def climbed(
 
 
 def floor_strips(problem: Problem, *, between: bool = False) -> list[SuspectedHeater]:
-    """Strips of floor as warm as the air, wherever no other patch lies; or those half-way `between` these."""
+    """Strips of floor at the temperature of the air, without those that overlap a stated patch.
+
+    `between` gives the strips half-way between these.
+    """
     box, scene = problem.scene.room, problem.scene
     edges_m = np.linspace(box.lower_m[0], box.upper_m[0], _STRIPS + 1)
     edges_m = 0.5 * (edges_m[:-1] + edges_m[1:]) if between else edges_m
@@ -125,6 +130,6 @@ def adjoin(one: Heater, other: Heater) -> bool:
 
 
 def with_heaters(problem: Problem, heaters: Sequence[Heater]) -> Problem:
-    """The problem with these heaters beside what is stated."""
+    """The problem with these heaters added."""
     boundary = (*problem.scene.boundary, *heaters)
     return Problem(replace(problem.scene, boundary=boundary), problem.shifts, problem.planes, problem.sensors)

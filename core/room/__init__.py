@@ -1,4 +1,9 @@
-"""A room solver: the Boussinesq equations on a staggered grid, marched to a steady state, differentiable.
+"""The forward model of a room: the Boussinesq equations on a staggered grid, marched to a steady state.
 
-Reading order: grid, boundary, transport, momentum, pressure, closure, model, level, march, setup, vertices.
+README.md has the equations, the scheme and the published cases that it is checked against. Reading order:
+
+    where things are    room_grid, wall_planes, openings, boundary_conditions
+    one time step       transport, momentum, pressure, k_epsilon, closure, step
+    a steady state      level, march
+    what is seen of it  vertices, forward
 """

@@ -1,9 +1,8 @@
-"""From a scene to the room solver: patches on cell faces, and the numbers that nobody knows exactly.
+"""From a scene to the room solver: patches on cell faces, and the parameters that a fit may change.
 
-A `RoomLayout` holds where things are; `RoomParameters` holds what may be wrong, as deviations that a fit
-can move; `boundary` joins the two, differentiably. Refused here: flow in that cannot leave, patches off
-their wall or over one another, contradictory walls, supply that points out of the room. Repaired with a
-sentence: a patch smaller than a cell, an outlet's missing area.
+`RoomLayout` holds where things are, `RoomParameters` the numbers that may be wrong; `boundary` makes the walls'
+arrays from both. Refused here: supply air without an outlet, patches that leave their wall or overlap, a wall
+described twice, a supply that points out of the room. A patch smaller than a cell is kept, with a sentence.
 """
 
 import equinox as eqx
@@ -21,15 +20,15 @@ from core.setting import SettingError
 
 
 class SuspectedHeater(Heater):
-    """A heater that nobody stated: its heat is fitted, its temperature means nothing by itself and is not shown."""
+    """A heater that nobody stated: its heat is fitted. Its temperature alone has no meaning and is not shown."""
 
 
 class RoomParameters(eqx.Module):
-    """What may be wrong, one array a kind. Temperatures in excess of ambient; logarithms are natural.
+    """The numbers that may be wrong. Temperatures are in excess of ambient; logarithms are natural.
 
-    `inlet_log_flow` multiplies the stated velocity; `wall_log_heat` and `heater_log_heat` are of the heat
-    coefficient in m/s, `log_heat` multiplies all walls' together; `log_closure` multiplies the eddy
-    viscosity, `log_viscosity` does so on a coarse lattice.
+    `inlet_log_flow` is a factor on the stated velocity. `wall_log_heat` and `heater_log_heat` are heat coefficients
+    [m/s]; `log_heat` is a factor on those of all walls. `log_closure` is a factor on the eddy viscosity, and
+    `log_viscosity` one that varies over the room on a coarse lattice.
     """
 
     inlet_excess_k: Float[Array, " inlets"]
@@ -44,9 +43,10 @@ class RoomParameters(eqx.Module):
 
 
 class RoomLayout(eqx.Module):
-    """Where openings and heaters are; what is stated about them; sentences about what was repaired.
+    """Where openings and heaters are, what is stated about them, and sentences on what the grid cannot hold.
 
-    `shown` says of each heater whether vertices on it have its temperature.
+    `shown`: whether vertices on a heater get its temperature. `heated`, `no_slip`, `held`: of each wall, 1 if heat
+    passes it, if air sticks to it, and if its temperature is stated.
     """
 
     grid: RoomGrid
@@ -113,7 +113,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
 
 
 def boundary(layout: RoomLayout, parameters: RoomParameters) -> Boundary:
-    """The walls' arrays for these parameters; differentiable in them."""
+    """The walls' arrays for these parameters."""
     planes = [_bare(layout, wall, parameters) for wall in range(6)]
     inflow = layout.inflow_m3_s(parameters)
     for n, opening in enumerate(layout.inlets):
@@ -131,7 +131,7 @@ def boundary(layout: RoomLayout, parameters: RoomParameters) -> Boundary:
 
 
 def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlane:
-    """The wall with its heaters, without openings' flow: conductances add, weighted by area."""
+    """The wall and its heaters, without flow: conductances are added, weighted by area."""
     grid = layout.grid
     plane = closed_wall(grid, wall // 2, float(layout.no_slip[wall]))
     closed = jnp.ones_like(plane.normal_m_s)
@@ -157,7 +157,7 @@ def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlan
 
 
 def _with_inlet(plane: WallPlane, layout: RoomLayout, n: int, parameters: RoomParameters) -> WallPlane:
-    """Supply `n` on its wall: flow, temperature, turbulence, and the momentum that coarse faces lose."""
+    """The wall with supply `n`: flow, temperature, turbulence, and the momentum that partly covered faces lose."""
     opening = layout.inlets[n]
     fraction = jnp.asarray(opening.fraction, jnp.float32)
     velocity = jnp.asarray(layout.inlet_velocity_m_s[n], jnp.float32) * jnp.exp(parameters.inlet_log_flow[n])

@@ -1,11 +1,11 @@
-"""Turbulence closures: what stands for the motion that a room grid cannot hold.
+"""Turbulence closures: the eddy viscosity that stands for motion smaller than the mean flow.
 
     constant       nu_t given (momentum and heat)
     zero_equation  nu_t = 0.03874 |u| l, l the distance to the nearest wall   (Chen and Xu 1998)
     k_epsilon      standard constants with wall functions                     (Launder and Spalding 1974)
 
-Each holds a state of its own (nothing, or k and epsilon), advances it, and says the effective viscosity
-in the cells and on the walls. k-epsilon has no buoyancy term in k and epsilon.
+A closure has a state (none, or k and epsilon), advances it in time, and gives the effective viscosity in the cells
+and on the walls. k-epsilon has no buoyancy term in the equations of k and epsilon.
 """
 
 import abc
@@ -22,11 +22,11 @@ from core.room.wall_planes import Boundary, Plane
 
 
 class AbstractClosure(eqx.Module):
-    """A closure; `start` makes its state from a mixing length and a speed."""
+    """A closure; `start` makes its first state."""
 
     @abc.abstractmethod
     def start(self, grid: RoomGrid, speed_m_s: float) -> KEpsilonState | None:
-        """The state of air at rest that is about to be stirred at `speed_m_s`."""
+        """The first state, of still air in a room with the velocity scale `speed_m_s`."""
 
     @abc.abstractmethod
     def advance(
@@ -45,7 +45,7 @@ class AbstractClosure(eqx.Module):
 
     @abc.abstractmethod
     def wall_heat(self, state: KEpsilonState | None, grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
-        """Factors on the walls' conductances (low, high an axis)."""
+        """Factors on the walls' conductances, (low, high) for each axis."""
 
 
 class AbstractAlgebraicClosure(AbstractClosure):
@@ -129,7 +129,7 @@ class KEpsilonClosure(AbstractClosure):
         return Viscosity(cells, energy_walls(state.energy_m2_s2, grid, self.molecular_m2_s))
 
     def wall_heat(self, state: KEpsilonState | None, grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
-        """More where the air is stirred."""
+        """The wall function's heat coefficient over the nominal one."""
         if state is None:
             return _even_walls(grid)
         return heat_walls(state.energy_m2_s2, grid, self.molecular_m2_s, self.prandtl)

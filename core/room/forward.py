@@ -1,4 +1,4 @@
-"""A room of one grid: parameters in, the marched flow and what measurements would see of it out."""
+"""A room on one grid: from parameters to the model that is marched, and from a flow to its vertices."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -32,7 +32,7 @@ _EDDY_SHARE = 0.0058
 
 
 class Room(eqx.Module):
-    """A scene laid on a grid with a closure; `speed_m_s` is the flow's own scale."""
+    """A scene on a grid with a closure; `speed_m_s` is the velocity scale of its flow."""
 
     scene: Scene = eqx.field(static=True)
     layout: RoomLayout
@@ -46,7 +46,7 @@ class Room(eqx.Module):
 
     @property
     def turnover_ratio(self) -> float:
-        """How much slower than the reference room (3.3 m at 0.5 m/s) this one turns over, at least 1."""
+        """Turnover time L / U over that of the reference room (3.3 m, 0.5 m/s), from 1 to 4."""
         edge_m = float(np.prod(self.scene.room.size_m)) ** (1 / 3)
         return float(np.clip(edge_m / self.speed_m_s / 6.6, 1.0, 4.0))
 
@@ -66,7 +66,7 @@ class Room(eqx.Module):
         )
 
     def at_rest(self, model: RoomModel, profile_k: Float[np.ndarray, " nz"]) -> Flow:
-        """Still air with a temperature of height only."""
+        """Still air whose temperature depends on height alone."""
         excess = jnp.asarray(np.broadcast_to(profile_k, self.grid.cells), jnp.float32)
         return air_at_rest(model, excess, self.speed_m_s)
 
@@ -88,13 +88,13 @@ class Room(eqx.Module):
 
 
 def closure_name(scene: Scene) -> str:
-    """The closure that a scene asks for; `auto` and `learned` start from k-epsilon."""
+    """The closure that a scene states; `auto` and `learned` give k-epsilon."""
     named = {"molecular": "molecular", "given": "constant", "zero_equation": "zero_equation"}
     return named.get(scene.flow.transport, "k_epsilon")
 
 
 def room(scene: Scene, cells: int, closure: str) -> Room:
-    """Lay `scene` on about cells^3 cells. Raises SettingError for a boundary that cannot be."""
+    """`scene` on about cells^3 cells. Raises SettingError for a boundary that cannot be."""
     layout = room_layout(scene, room_grid(scene.room, cells, opening_edges_m(scene)))
     speeds = [float(np.linalg.norm(v)) for v in layout.inlet_velocity_m_s]
     return Room(scene, layout, closure, max([*speeds, _plume_speed_m_s(scene)]))
@@ -109,7 +109,7 @@ def _plume_speed_m_s(scene: Scene) -> float:
 
 
 def lattice_to_cells(lattice: Float[Array, "lx ly lz"], grid: RoomGrid) -> Float[Array, "nx ny nz"]:
-    """A coarse lattice over the room, walls included, to its cells."""
+    """A coarse lattice over the room, walls included, interpolated to the cells."""
     field = lattice
     for a in AXES:
         nodes = np.linspace(0.0, 1.0, lattice.shape[a])
@@ -119,7 +119,7 @@ def lattice_to_cells(lattice: Float[Array, "lx ly lz"], grid: RoomGrid) -> Float
 
 
 def carried_over(flow: Flow, source: RoomGrid, target: RoomGrid) -> Flow:
-    """A flow on another grid of the same room, linearly; its divergence goes at the first step."""
+    """A flow, linearly interpolated to another grid of its room; the first step removes its divergence."""
 
     def cells(field: Float[Array, "nx ny nz"], faces: int | None = None) -> Float[Array, "mx my mz"]:
         for a in AXES:

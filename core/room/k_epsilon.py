@@ -137,10 +137,10 @@ def energy_walls(
 def heat_walls(
     k: Cells, grid: RoomGrid, molecular_m2_s: Float[Array, ""], prandtl: float
 ) -> tuple[tuple[Float[Array, "..."], Float[Array, "..."]], ...]:
-    """Heat coefficient of the walls' air relative to free convection's nominal one (low, high an axis).
+    """Heat coefficient of the walls over the nominal one of free convection, (low, high) for each axis.
 
-    Jayatilleke's wall function where the air is stirred; where it is not, half of the nominal coefficient or
-    conduction through half a cell. A jet that sweeps a wall takes several times the heat of a still corner.
+    Jayatilleke's wall function; but at least conduction through half a cell, and half of the nominal coefficient.
+    A jet along a wall takes up several times the heat of a still corner.
     """
     ratio = prandtl / TURBULENT_PRANDTL
     sublayer = 9.24 * (ratio**0.75 - 1.0) * (1.0 + 0.28 * np.exp(-0.007 * prandtl / TURBULENT_PRANDTL))

@@ -1,10 +1,9 @@
-"""The room's temperature level, found by heat balance of its layers instead of by waiting.
+"""The level of T, found by a heat balance of horizontal layers instead of by marching on.
 
-Jets settle in under a minute; the level of the temperature takes the room's time constant, a quarter of
-an hour. The heat equation is linear in T: summed over horizontal layers it is a small matrix A of the
-exchange between layers (mass flow both ways, diffusion) and with walls and outlets. A room that still
-warms at the rate r will have warmed by about A^-1 r. One coarse Newton step, the aggregation of
-algebraic multigrid; its fixed point is the steady state, for which r = 0.
+Jets become steady in under a minute; the level of T takes a quarter of an hour. The heat equation is linear in T.
+Summed over horizontal layers it is a small matrix A: the exchange between layers (flow both ways, diffusion) and with
+walls and outlets. A room that still warms at the rate r will warm by about A^-1 r. This is one coarse Newton step,
+the aggregation of algebraic multigrid; its fixed point is the steady state, where r = 0.
 """
 
 import jax.numpy as jnp
@@ -15,16 +14,16 @@ from core.room.step import Flow, RoomModel
 
 
 def level_correction(flow: Flow, warming_k_s: Cells, model: RoomModel, ahead_s: float) -> Float[Array, " nz"]:
-    """What to add to the temperature of each layer [K] when the room warms by `warming_k_s`.
+    """What to add to the temperature of each layer [K] of a room that warms by `warming_k_s`.
 
-    The uniform part goes all the way; differences between layers, which internal waves disturb, go as far
-    as they would in `ahead_s` (implicit Euler).
+    The uniform part is added whole. Differences between layers, which internal waves disturb, are added as far as
+    they would grow in `ahead_s` (implicit Euler).
     """
     exchange = layer_exchange_m3_s(flow, model)
     volume = model.grid.volume_m3
     source = warming_k_s.sum((0, 1)) * volume
     lost = exchange.sum(1)
-    # A room that loses no heat has no level: one air change an hour keeps its correction finite.
+    # A room that loses no heat has no steady level: a loss of one air change an hour keeps this finite.
     leak = volume * warming_k_s.size / 3600.0
     uniform = source.sum() / (lost.sum() + leak)
     layer_m3 = volume * warming_k_s.shape[0] * warming_k_s.shape[1]
@@ -33,7 +32,7 @@ def level_correction(flow: Flow, warming_k_s: Cells, model: RoomModel, ahead_s: 
 
 
 def layer_exchange_m3_s(flow: Flow, model: RoomModel) -> Float[Array, "nz nz"]:
-    """A: heat that leaves each layer per kelvin of every layer, over rho c."""
+    """The matrix A: heat that leaves each layer per kelvin of every layer, over rho c."""
     grid = model.grid
     inner = cut(flow.velocity[2], 1, -1, 2)
     diffusive = face_mean(model.diffusivity_m2_s(model.viscosity(flow)), 2) / grid.spacing_m[2]

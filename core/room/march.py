@@ -1,10 +1,10 @@
-"""March a room to its steady state: chunks of jitted steps, the step length between them, a running mean.
+"""March a room to its steady state, in windows of model time.
 
-The march ends when the mean flow of one window differs from the window before by less than `tolerance`
-(relative rms of velocity), at `longest_s`, or after `most_steps`. What is returned is the mean over the
-last third of the model time: coarse grids hold slow oscillations that a steady truth has not. Mean
-temperatures can be held, the room's or every layer's: after each window the air is shifted to them. If a value
-becomes infinite the march goes back to the last window and halves the Courant number, once.
+The march ends when the mean velocity of a window differs from that of the window before by less than `tolerance`
+(relative rms), at `longest_s`, or after `most_steps`. The result is the mean over the last third of the time, since
+flows on coarse grids oscillate slowly. The mean temperature of the room, or of every layer, can be held: the air is
+shifted to it after each window. If a value becomes infinite, the march returns to the last window and halves the
+Courant number, once.
 """
 
 from collections.abc import Callable
@@ -28,10 +28,9 @@ from core.setting import SettingError, setting
 class MarchSettings:
     """How long and how finely to march.
 
-    `least_s`: before it no march counts as settled: air that has just been asked for another supply hardly
-    differs between windows. `level_ahead_s`: how far each window's heat balance is carried ahead (0 leaves
-    the level of the temperature to time); it begins after `settle_s` and ends with the first two thirds. No
-    window begins after `most_steps`.
+    `least_s`: no march is called steady before it; just after a change of the supply windows hardly differ.
+    `level_ahead_s`: how far the layers' heat balance is extrapolated after each window (`core.room.level`; 0: not at
+    all), from `settle_s` to two thirds of `longest_s`. No window begins after `most_steps`.
     """
 
     longest_s: float = 60.0
@@ -60,7 +59,7 @@ class MarchSettings:
 class March(eqx.Module):
     """The end of a march: last state, mean of the last third, how it ended, model time and steps.
 
-    `held_k_s` is what it took to keep the temperatures that were asked for, mean of room and last third.
+    `held_k_s` is the heating rate that held the temperatures, as a mean over the room and the last third.
     """
 
     last: Flow
@@ -80,10 +79,7 @@ def march(
     held_k: Float[Array, " layers"] | None = None,
     on_window: Callable[[dict[str, Any]], object] | None = None,
 ) -> March:
-    """The steady flow that `flow` settles to.
-
-    It is kept at the mean excess temperatures `held_k`, of every layer or one of the room, if they are given.
-    """
+    """March `flow` to its steady state; `held_k` holds the mean excess temperature of each layer, or of the room."""
     windows: list[Flow] = []
     held: list[float] = []
     seconds = settings.window_s
@@ -101,7 +97,7 @@ def march(
         model_s, steps = model_s + seconds, steps + taken
         change = float(_relative_change(mean, windows[-1])) if windows else float("inf")
         marched += 1
-        # No more than the last third is asked for, whenever the march ends.
+        # Only the last third is needed, whenever the march ends.
         windows = [*windows, mean][-_third(marched) :]
         if on_window is not None:
             # The middle of the room as it is now, for somebody to watch it grow.

@@ -114,7 +114,7 @@ def _friction(
 
 
 def _with_inlets(rate: Field, walls: tuple[WallPlane, WallPlane], axis: int) -> Field:
-    """The inlets' missing momentum flux, given to the first inner faces."""
+    """The rates with the inlets' missing momentum flux, on the first inner faces."""
     first = tuple(0 if a == axis else slice(None) for a in AXES)
     last = tuple(-1 if a == axis else slice(None) for a in AXES)
     return rate.at[first].add(walls[0].force_m_s2).at[last].add(walls[1].force_m_s2)

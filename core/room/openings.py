@@ -30,7 +30,7 @@ class Opening(eqx.Module):
 
 
 def lay_patch(patch: Patch, room: Box, grid: RoomGrid, notes: list[str]) -> Opening:
-    """`patch` on the faces of its wall; adds a sentence to `notes` where the grid cannot hold it.
+    """`patch` on the cell faces of its wall; adds a sentence to `notes` if it is smaller than a cell.
 
     Raises:
         SettingError: the patch has no area or leaves its wall.
@@ -57,7 +57,7 @@ def lay_patch(patch: Patch, room: Box, grid: RoomGrid, notes: list[str]) -> Open
 
 
 def opening_edges_m(scene: Scene) -> tuple[tuple[float, ...], ...]:
-    """Where inlets and outlets begin and end along each axis [m]: a face there keeps a jet's first profile."""
+    """Edges of inlets and outlets along each axis [m]: cell faces there keep a jet's profile at its opening."""
     edges: tuple[list[float], ...] = ([], [], [])
     for part in scene.boundary:
         if isinstance(part, Inlet | Outlet):

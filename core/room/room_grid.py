@@ -63,12 +63,12 @@ def room_grid(room: Box, cells: int, edges_m: tuple[tuple[float, ...], ...] = ((
 
 
 def _aligned(least: int, shares: list[float]) -> int:
-    """The number of cells that leaves edges, at these shares of the axis, least far from faces in all."""
+    """The number of cells with the least sum of distances from edges, given as shares of the axis, to faces."""
 
     def apart(cells: int) -> float:
         return sum((abs(cells * share - round(cells * share)) for share in shares), start=0.0)
 
-    # Within a tenth of a cell an edge is as good as on the face.
+    # Distances below a tenth of a cell count as none.
     return min(range(least, least + least // 10 + 1), key=lambda cells: (round(apart(cells), 1), cells))
 
 
@@ -88,7 +88,7 @@ def difference(field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
 
 
 def stored(field: Float[Array, "..."]) -> Float[Array, "..."]:
-    """`field` kept as it is, joined: XLA would join it anew in every loop that reads it, cell by cell."""
+    """`field`, stored: else XLA would concatenate it again in every loop that reads it."""
     return lax.optimization_barrier(field)
 
 

@@ -1,4 +1,4 @@
-"""Cells to the room's vertices: linear between cell centres, with the walls' own values on the walls."""
+"""From cells to the room's vertices: linear between cell centres, with the walls' values on the walls."""
 
 from collections.abc import Callable
 
@@ -25,7 +25,7 @@ class RoomFields(eqx.Module):
 
 
 def vertex_excess_k(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> Vertices:
-    """Excess temperature: inlets carry the supply's, what passes heat its own where stated, others their air's."""
+    """Excess temperature: on inlets the supply's, on walls and heaters the stated one, else that of the next air."""
 
     def value(wall: WallPlane, cell: Field, inward: float) -> Field:
         share = jnp.where(wall.conductance_m_s > 0, wall.held, 0.0)
@@ -56,7 +56,7 @@ def vertex_pressure_m2_s2(flow: Flow, model: RoomModel, vertices: tuple[int, int
 def vertex_velocity_m_s(
     velocity: Velocity, model: RoomModel, vertices: tuple[int, int, int]
 ) -> Float[Array, "vx vy vz 3"]:
-    """Velocity; zero on no-slip walls but for the openings."""
+    """Velocity; zero on no-slip walls except in openings."""
     components = []
     for a in AXES:
         component = velocity[a]
@@ -79,7 +79,7 @@ def cell_matrix(
 def linear_matrix(
     nodes: Float[np.ndarray, " nodes"], points: Float[np.ndarray, " points"]
 ) -> Float[np.ndarray, "points nodes"]:
-    """Weights of the nodes in the linear interpolant at the points; ends are continued."""
+    """Matrix of linear interpolation from nodes to points; constant beyond the ends."""
     index = np.clip(np.searchsorted(nodes, points) - 1, 0, len(nodes) - 2)
     share = np.clip((points - nodes[index]) / (nodes[index + 1] - nodes[index]), 0.0, 1.0)
     matrix = np.zeros((len(points), len(nodes)))
@@ -102,7 +102,7 @@ def _on_walls(
 
 
 def _extended(cells: Cells, planes: list[tuple[Field, Field]]) -> Field:
-    """Cells with their wall values around them; edges are the mean of the two walls that meet."""
+    """Cells with the walls' values around them; an edge has the mean of its two walls."""
     field = jnp.pad(cells, 1, mode="edge")
     for a in AXES:
         for end, plane in zip((0, -1), planes[a], strict=True):
@@ -133,7 +133,7 @@ def _close(component: Field, walls: tuple[WallPlane, WallPlane], a: int, b: int)
         padded = jnp.pad(tangent, [(1, 1) if d == axis else (0, 0) for d in (0, 1)], mode="edge")
         on_faces = 0.5 * (cut(padded, 0, -1, axis) + cut(padded, 1, 0, axis))
         cell = nearest(component, b)
-        # An axis closed before is longer by its two walls.
+        # An axis whose walls were added before has two more planes.
         grown = [((n - m) // 2,) * 2 for n, m in zip(cell.shape, on_faces.shape, strict=True)]
         planes.append(wall.no_slip * jnp.pad(on_faces, grown, mode="edge") + (1.0 - wall.no_slip) * cell)
     return jnp.concatenate([jnp.expand_dims(planes[0], b), component, jnp.expand_dims(planes[1], b)], b)

@@ -1,8 +1,8 @@
-"""What the six walls do to the air: arrays over each wall's cells, made by `core.room.boundary_conditions`.
+"""The boundary conditions as arrays over the cells of the six walls (made by `core.room.boundary_conditions`).
 
-A patch covers a fraction f of each cell face. Its volume flow f U is exact then, but its momentum flux
-f U^2 is not (f U)^2: the missing U^2 (f - f^2) is a force on the first cells, without which a jet on an
-unaligned grid is too weak.
+A patch covers a fraction f of a cell's face. The face's volume flow f U is exact, but its momentum flux is f U^2,
+not (f U)^2. The difference U^2 (f - f^2) is added as a force on the first cells; without it jets from partly
+covered faces are too weak.
 """
 
 import equinox as eqx
@@ -17,10 +17,10 @@ Plane = Float[Array, "first second"]
 class WallPlane(eqx.Module):
     """One wall. Velocities point along the axes; temperatures are in excess of the ambient one.
 
-    `conductance_m_s` is the kinematic heat coefficient q / (rho c dT) over the face, `wall_excess_k` the
-    conductance-weighted mean temperature behind it; `no_slip` is 1 for no-slip and 0 for a free surface;
-    `held` is the share of the face whose own temperature is known, and shown on its vertices;
-    `turbulent_energy_m2_s2` and `dissipation_m2_s3` are those of inflowing air.
+    `conductance_m_s` is the kinematic heat coefficient q / (rho c dT), and `wall_excess_k` the wall's temperature,
+    weighted with it where several parts share a face. `no_slip` is 1 for a no-slip wall and 0 for a free surface.
+    `held` is the share of the face with a stated temperature, which its vertices show. `turbulent_energy_m2_s2`
+    and `dissipation_m2_s3` are those of the air that flows in.
     """
 
     normal_m_s: Plane
@@ -42,19 +42,19 @@ class Boundary(eqx.Module):
 
 
 def closed_wall(grid: RoomGrid, axis: int, no_slip: float = 1.0) -> WallPlane:
-    """A wall at rest that no heat passes."""
+    """An adiabatic wall without openings."""
     zero = jnp.zeros(grid.plane(axis), jnp.float32)
     return WallPlane(zero, (zero, zero), zero, zero, zero, zero, zero, zero, jnp.float32(no_slip), zero + 1.0)
 
 
 def closed_room(grid: RoomGrid, no_slip: float = 1.0) -> Boundary:
-    """Six closed adiabatic walls: the start of every setup."""
+    """Six adiabatic walls without openings."""
     x, y, z = ((closed_wall(grid, a, no_slip), closed_wall(grid, a, no_slip)) for a in AXES)
     return Boundary((x, y, z))
 
 
 def set_normal(velocity: Velocity, boundary: Boundary) -> Velocity:
-    """Velocity with the walls' normal components put in."""
+    """`velocity` with the walls' normal components set."""
     u, v, w = (
         velocity[a]
         .at[_index(a, 0)]
@@ -69,7 +69,7 @@ def set_normal(velocity: Velocity, boundary: Boundary) -> Velocity:
 def inflow_ghosts(
     field: Float[Array, "nx ny nz"], low: tuple[Plane, Plane], high: tuple[Plane, Plane], axis: int
 ) -> Float[Array, "..."]:
-    """Two ghost cells beyond each wall: the inflow's value where air comes in, the cell's elsewhere.
+    """The field with two ghost cells beyond each wall: the inflow's value where air enters, else the cell's.
 
     `low` and `high` are (normal velocity, value of inflowing air).
     """

@@ -1,15 +1,15 @@
-"""Solve by a room that is marched in time and whose boundary the images correct.
+"""`standard` and `reference`: a room marched in time, with its boundary corrected by the measurements.
 
-A coarse room settles, a finer one starts from it, and the misfit with the data corrects what was stated
-(`core.estimate.parameter_fit`). What comes out carries standard deviations: the parameters' posterior, and what the
-grid and the closure cannot represent, from the differences of two grids and of two closures.
+A coarse room is marched to a steady state, a finer one starts from it, and the fit (`core.estimate`) corrects what
+was stated. Standard deviations come from the parameters' posterior and from the differences of two grids and of two
+closures. core/estimate/README.md has the method.
 """
 
 import time
 
 import numpy as np
 
-from core.estimate.alternatives import HEAT_WORTHWHILE, left_over, promising_closure, suspected_heat
+from core.estimate.alternatives import KEEP_HEAT, left_over, promising_closure, suspected_heat
 from core.estimate.diagnostics import another_closure
 from core.estimate.forward_runs import (
     Derivatives,
@@ -37,7 +37,7 @@ from core.room.forward import carried_over, closure_name, room
 def solve_room(
     problem: Problem, settings: RoomSettings = RoomSettings(), *, on_event: Event | None = None
 ) -> Solution:
-    """T, p and u of the room, with deviations and sentences about what the images contradict.
+    """T, p and u of the room, with standard deviations and sentences for the operator.
 
     Raises:
         SettingError: a boundary that cannot be (see `core.room.boundary_conditions`).
@@ -50,9 +50,9 @@ def solve_room(
 def background_of(
     problem: Problem, settings: RoomSettings, report: Event, closure: str | None = None
 ) -> Background:
-    """What is the same for all images of a room: both grids as stated, and the coarse one's derivatives.
+    """Forward runs of the room as stated on both grids, and derivatives on the coarse one: no image is used.
 
-    `closure` is another than the scene's.
+    `closure` replaces the scene's.
     """
     problem = with_plane_openings(problem)
     closure = closure or closure_name(problem.scene)
@@ -65,7 +65,7 @@ def background_of(
     flow = carried_over(base.flow.last, coarse.grid, fine.grid)
     first = march_under(fine, prior.mean, flow, settings.refine_s, vertices, report)
     derivatives = perturbed(coarse, prior, np.zeros(len(prior.active())), base, settings, vertices)
-    # As it looks after having settled for as long again.
+    # The unchanged restart has marched as long as the moved ones: it is what they are compared with.
     base = ForwardRun(base.parameters, base.flow, derivatives.start)
     return Background(problem, coarse, fine, prior, base, first, derivatives)
 
@@ -73,10 +73,10 @@ def background_of(
 def analyse(
     background: Background, problem: Problem, settings: RoomSettings, report: Event, *, start_s: float
 ) -> Solution:
-    """The solution for the shifts of `problem`, another measurement of the room that was background.
+    """The solution for the shifts of `problem`, which may be another measurement of the background's room.
 
-    Where heat that nobody stated, or another closure, may explain the images better, a room with it is fitted as well
-    and the better of the two is taken.
+    If another closure, or a heater that nobody stated, may explain the images better, that room is fitted as well and
+    the better one is taken.
     """
     analysis = fitted_room(background, problem, settings, report)
     notes: tuple[str, ...] = ()
@@ -93,21 +93,21 @@ def analyse(
         again = fitted_room(
             background_of(warm, settings, report, background.coarse.closure), problem, settings, report
         )
-        if left_over(again) < HEAT_WORTHWHILE * left_over(analysis):
+        if left_over(again) < KEEP_HEAT * left_over(analysis):
             notes, analysis = (), again
     report(supplied(analysis.layout, analysis.best))
     return solution(analysis, time.perf_counter() - start_s, use_images=settings.use_images, notes=notes)
 
 
 def data_of(background: Background, problem: Problem, settings: RoomSettings) -> Observations:
-    """The data of `problem`, as vertices of the room that was background see them."""
+    """The data of `problem`, with the openings of the background's room."""
     stated = background.problem
     of = Problem(stated.scene, problem.shifts, stated.planes, stated.sensors)
     return observations(of, (settings.vertices, settings.vertices, settings.vertices))
 
 
 def fitted_room(background: Background, problem: Problem, settings: RoomSettings, report: Event) -> Analysis:
-    """Parameters and level that measurements ask for, and what deviations are made of."""
+    """The fit: parameters, then the level of T, and everything that the standard deviations need."""
     coarse, fine, prior = background.coarse, background.fine, background.prior
     vertices = (settings.vertices, settings.vertices, settings.vertices)
     data = data_of(background, problem, settings)
@@ -145,7 +145,7 @@ def fitted_room(background: Background, problem: Problem, settings: RoomSettings
 
 
 def supplied(layout: RoomLayout, best: ForwardRun) -> dict[str, float]:
-    """Excess temperature and speed of every supply in the room that was found."""
+    """Excess temperature and speed of every supply in the fitted room."""
     found: dict[str, float] = {}
     for n, velocity in enumerate(layout.inlet_velocity_m_s):
         speed = float(np.linalg.norm(velocity)) * float(np.exp(best.parameters.inlet_log_flow[n]))

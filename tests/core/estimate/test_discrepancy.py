@@ -3,7 +3,7 @@ import pytest
 
 from core.estimate.discrepancy import Correction, temperature_correction
 from core.estimate.observation import Observations, observations
-from core.estimate.posterior import bent_m4_s4, carried_m2_s2
+from core.estimate.posterior import hydrostatic_m2_s2, hydrostatic_variance_m4_s4
 from core.geometry import Box, looking_along_y
 from core.problem import PlaneData, Problem
 from core.scene import FixedTexture, Outlet, Patch, Scene, View
@@ -74,12 +74,12 @@ def test_without_data_nothing_moves_and_nothing_is_learnt():
 def test_warmer_air_carries_more_pressure_up():
     z_m = np.linspace(0.0, 2.4, 15)
     seen = data()
-    carried = carried_m2_s2(Problem(seen.scene, ()), z_m, np.full((4, 4, 15), 2.0))
+    carried = hydrostatic_m2_s2(Problem(seen.scene, ()), z_m, np.full((4, 4, 15), 2.0))
     np.testing.assert_allclose(carried, 9.81 / 293.15 * 2.0 * z_m, rtol=1e-6)
 
 
 def test_an_open_level_leaves_pressure_open_at_floor_and_ceiling_and_not_half_way_up():
     z_m = np.linspace(0.0, 2.4, 15)
-    std = np.sqrt(bent_m4_s4(Problem(data().scene, ()), z_m, np.full((4, 4, 15), 0.2**2)))
+    std = np.sqrt(hydrostatic_variance_m4_s4(Problem(data().scene, ()), z_m, np.full((4, 4, 15), 0.2**2)))
     assert std.shape == (4, 4, 15)
     np.testing.assert_allclose(std[2, 1], 9.81 / 293.15 * 0.2 * np.abs(z_m - 1.2), rtol=1e-6, atol=1e-12)

@@ -12,7 +12,7 @@ def test_the_closure_is_not_let_go_in_a_wrong_supplys_place():
     def moved(gaussian: list[bool]) -> np.ndarray:
         return gauss_newton(np.array([5.0, 5.0]), residual, variance, jacobian, np.array(gaussian)).vector
 
-    # Were both priors Student's, nothing would report the two apart.
+    # Were both priors Student's, nothing would tell the two apart.
     same = moved([False, False])
     assert same[0] == pytest.approx(same[1])
     # A gaussian one pulls as far as one step may go (three deviations), and the supply takes it up.

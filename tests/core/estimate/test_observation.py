@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -43,7 +42,7 @@ def layered(given: Problem) -> RoomFields:
     """A room of 10 cells an edge, 2.49 K above ambient below 1 m and 7.5 K above that."""
     where = room(given.scene, 10, "constant")
     model = where.model(room_prior(given, where.layout).mean)
-    flow = where.at_rest(model, jnp.asarray(np.where(where.grid.centres_m(2) < 1.0, 2.49, 7.5)))
+    flow = where.at_rest(model, np.where(where.grid.centres_m(2) < 1.0, 2.49, 7.5))
     return room_fields(flow, model, where.layout, VERTICES)
 
 

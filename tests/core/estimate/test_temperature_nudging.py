@@ -1,4 +1,4 @@
-"""A held room: what is reported of the heat that it took, and that its level is not corrected twice."""
+"""A held room: the heat that holding it took is said, and its level is not corrected twice."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -8,7 +8,7 @@ import pytest
 from core.estimate.diagnostics import balances
 from core.estimate.observation import observations
 from core.estimate.prior import Prior, room_prior
-from core.estimate.temperature_nudging import unheld
+from core.estimate.temperature_nudging import without_nudging
 from core.geometry import WALLS, Box, looking_along_y
 from core.problem import Problem
 from core.room.forward import room
@@ -56,7 +56,7 @@ def test_a_room_that_was_held_goes_back_to_its_own_level_and_where_walls_are_unk
     warmer = np.linspace(0.1, 0.7, VERTICES[2])
     held = RoomFields(own + warmer, np.zeros(VERTICES), still, np.array([5.5]))
 
-    back = unheld(held, before, data, prior_of(given), free)
+    back = without_nudging(held, before, data, prior_of(given), free)
 
     expected = own + (warmer - warmer.mean() if stated else 0.0)
     np.testing.assert_allclose(back.excess_k, expected, atol=1e-9)

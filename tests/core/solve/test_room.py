@@ -97,7 +97,7 @@ def test_images_repair_a_supply_that_was_entered_wrongly(truth: Solution):
     # Entered 2 K too warm and 20 % too fast; marches this short leave a tenth of a kelvin and a few per cent.
     assert warmest_k == pytest.approx(true_warmest_k, abs=0.2)
     assert flow == pytest.approx(true_flow, rel=0.05)
-    # The operator is reported.
+    # The operator is told.
     assert any("than the 305.15 K entered" in note for note in found.notes)
     assert found.temperature_std_k.min() > 0
     assert found.informed.max() > 0.3
