@@ -1,7 +1,7 @@
-"""What is known of the temperature, put on the vertices of a grid: planes, patches, sensors, one mean.
+"""Known temperatures on the vertices of a grid: planes as values, outlets and sensors as means.
 
-The thermal layer at a wall of given temperature is thinner than a cell, so a wall's temperature is not
-the temperature of the air at the grid's wall vertices; it is left to solvers that model the layer.
+The temperature of a wall is not used: its thermal layer is thinner than a cell, so the air beside it is at another
+temperature. Solvers that model the layer use it.
 """
 
 from dataclasses import dataclass
@@ -80,9 +80,8 @@ def plane_on_grid(grid: VertexGrid, plane: PlaneData, values: np.ndarray) -> np.
 def known_temperature(problem: Problem, grid: VertexGrid) -> KnownTemperature:
     """Gather planes, outlets and sensors.
 
-    Supply air and heaters differ from the room's air beside them by a jet or a boundary layer: taken as
-    the room's temperature at that place they would lift the level of all of it. A supply sets the level
-    only where nothing else is known.
+    Supply air and heaters are not the temperature of the room's air: as values at their place they would lift the
+    level of the whole room. The supply's temperature is used only if nothing else is known.
     """
     mask = np.zeros(grid.shape, bool)
     value, std = np.full(grid.shape, np.nan), np.full(grid.shape, np.nan)

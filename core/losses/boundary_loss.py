@@ -1,4 +1,4 @@
-"""What a scene knows at its boundary, as rows for the boundary loss.
+"""The boundary loss of a scene: planes, openings, heaters and walls as rows.
 
 Each field is divided by the largest value that is known of it (paper, section II-D), with the scales'
 floors where that would be zero; one scale for the whole velocity vector.
@@ -19,17 +19,16 @@ from core.scene import Heater, Inlet, Outlet, Patch, Wall
 from core.setting import SettingError
 from core.solve.nondimensional import Frame
 
-# A reading that is one standard deviation off weighs this much against the losses, which are means of squares.
+# Weight of a thermometer's or anemometer's error of one standard deviation; the other losses are means of squares.
 _READING = 0.01
-# Where no plane or sensor is known an outlet alone fixes the level of T: ten times as much.
+# The same for an outlet where no plane or sensor is known: it alone fixes the level of T.
 _ONLY_READING = 0.1
 
 
 def boundary_loss(problem: Problem, frame: Frame, *, weight: float, points_an_axis: int) -> BoundaryLoss:
     """Rows of planes, inlets, outlets, heaters and walls, on `points_an_axis` points along each wall axis.
 
-    The edges of a patch are as sharp as those points. Later entries do not override earlier ones: where a
-    wall holds a patch, the wall's own condition is left out.
+    The edges of a patch are as sharp as those points. Within a patch the condition of its wall is left out.
     """
     patches = [_plane(plane, frame, points_an_axis) for plane in problem.planes]
     known = {plane.wall for plane in problem.planes}
@@ -48,7 +47,7 @@ def boundary_loss(problem: Problem, frame: Frame, *, weight: float, points_an_ax
 
 
 def point_losses(problem: Problem, frame: Frame) -> tuple[PointLoss, ...]:
-    """Sensors, and one weak row that fixes the constant of p where nothing else does."""
+    """Sensors, and one weak row for the constant of p if nothing else fixes it."""
     losses = [_sensors(sensor, frame) for sensor in problem.sensors]
     knows_p = bool(problem.planes) or any(isinstance(item, Outlet) for item in problem.scene.boundary)
     if not knows_p:
@@ -79,7 +78,7 @@ def level_loss(problem: Problem, frame: Frame, points_an_axis: int) -> MeanLoss 
 
 
 def _inwards(spans: Spans, wall: WallName, frame: Frame, n: int) -> Spans:
-    """Half a cell of the grid inside: air that leaves has no layer, and nothing else holds a grid's ghosts."""
+    """Points half a cell inside the wall. Air that leaves has no thermal layer, so these have its temperature."""
     face = face_of(wall)
     axis = face.axis
     step = (frame.upper[axis] - frame.lower[axis]) / (n - 1) * face.inward
@@ -113,10 +112,10 @@ def _plane(plane: PlaneData, frame: Frame, n: int) -> KnownValues:
 
 
 def _resolves_layers(problem: Problem) -> bool:
-    """Whether the model's transport is the air's own up to the walls.
+    """Whether the model resolves the thermal layers at walls.
 
-    With the effective transport of a mean flow the thermal layer at a wall is thinner than a cell: the
-    wall's temperature is not that of the air beside it, and would drag the whole room along.
+    It does not with the effective transport of a mean flow: there a layer is thinner than a cell, and the wall's
+    temperature is not that of the air beside it.
     """
     return problem.scene.flow.transport in ("molecular", "given")
 
@@ -164,7 +163,7 @@ def _patch(item: Inlet | Outlet | Heater, frame: Frame, n: int) -> KnownValues:
             target = _values(shape, frame, item.temperature_k)
             weight = _masked(inside, temperature=1.0, pressure=0.0, velocity=1.0)
         case Outlet():
-            # The patch's mean temperature is a row of its own: it is not each point's.
+            # Its mean temperature is a row of its own (`level_loss`), not a value at each point.
             target = _values(shape, frame, frame.scales.reference_k)
             weight = _masked(inside, temperature=0.0, pressure=1.0, velocity=0.0)
     return KnownValues(spans, target, weight)

@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 from core.air import GRAVITY_M_S2, Air
 from core.setting import SettingError, setting
 
-# Below these a scale would be zero (still air, isothermal inlet, zero boundary field) or lost in noise.
+# Least scales: still air or an isothermal inlet would give zero.
 EXCESS_FLOOR_K = 0.1
 VELOCITY_FLOOR_M_S = 0.01
 

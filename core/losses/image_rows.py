@@ -23,7 +23,7 @@ from core.scene import Scene
 from core.setting import SettingError
 from core.window_fit import derivative_filter
 
-# Above this a full-resolution term would be slower than windows and no better: they lose nothing.
+# Larger pictures are measured in windows, which hold the same information and are faster.
 MOST_PIXELS = 300_000
 
 

@@ -160,8 +160,8 @@ class MeanLoss(eqx.Module):
 class SmoothnessLoss(eqx.Module):
     """Mean square slope of T's departure from `expected`, over the slopes that a room has.
 
-    Images see integrals along y only: across the view slopes may be large, along it they are believed to
-    be small. `slopes` are in nondimensional units along x, y, z.
+    Images see integrals along y only: slopes across the view may be large, slopes along it are taken to be small.
+    `slopes` are nondimensional, along x, y, z.
     """
 
     spans: Spans = eqx.field(static=True)
@@ -182,14 +182,14 @@ class SmoothnessLoss(eqx.Module):
 
 
 class PriorLoss(eqx.Module):
-    """What is believed before measuring: drift and learned transport are near zero, one sigma each."""
+    """Priors: drift and learned transport are zero, within one standard deviation."""
 
     drift_std_px: float = eqx.field(static=True, default=0.3)
     log_transport_std: float = eqx.field(static=True, default=1.0)
     name: str = eqx.field(static=True, default="prior")
 
     def rows(self, fields: Fields, unknowns: Unknowns, key: PRNGKeyArray | None) -> Rows:
-        """One row an unknown number; per measurement, as the other losses are means."""
+        """One row for each unknown, weighted against losses that are means."""
         rows = []
         if unknowns.drift_px is not None:
             rows.append(1e-2 * unknowns.drift_px / self.drift_std_px)

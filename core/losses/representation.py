@@ -1,6 +1,6 @@
-"""What a loss may ask of a representation of (T, p, u), and the unknowns that are solved for.
+"""The protocol between losses and representations of (T, p, u), and the unknowns of a solve.
 
-A representation does not know which losses there are; a loss does not know what it is evaluated on.
+A representation does not know the losses, and a loss does not know the representation.
 """
 
 from typing import Protocol, runtime_checkable
@@ -34,15 +34,15 @@ class Fields(Protocol):
 
 @runtime_checkable
 class Representation(Protocol):
-    """Parameters that make fields."""
+    """Parameters that give fields."""
 
     def fields(self) -> Fields:
-        """The fields of these parameters; what several losses share is computed here once."""
+        """The fields of these parameters; what several losses need is computed here once."""
         ...
 
 
 class Unknowns(eqx.Module):
-    """A representation, and what the measurement did not keep still.
+    """All unknowns of a solve: a representation, and what the scene leaves open besides.
 
     `drift_px`: a similarity of each view's pattern in the picture (camera and projector together; they
     are the same four numbers to first order when the wall is seen face-on): move along columns and

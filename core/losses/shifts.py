@@ -1,4 +1,4 @@
-"""The image loss: what the air does to the pictures, against what was seen.
+"""The image loss: the shifts that the model's air causes, against the measured ones.
 
 The flow image is linear in the shift d (physics: shifts are far below a pixel), so all three data terms
 are rows  (g · d − b) / σ  at sensor positions:
@@ -73,7 +73,7 @@ class ShiftLoss(eqx.Module):
     def rows(self, fields: Fields, unknowns: Unknowns, key: PRNGKeyArray | None) -> Rows:
         """All rows, or a random choice."""
         excess_k = self.scales.excess_k * fields.on_grid(self.spans).temperature
-        # A step of an optimiser may pass through nonsense: refractivity stays finite above 0 K.
+        # An optimiser may try temperatures near 0 K: refractivity must stay finite.
         excess_k = jnp.maximum(excess_k, -0.8 * self.air.ambient_temperature_k)
         excess = self.air.excess_refractivity(excess_k)
         found = []

@@ -53,7 +53,7 @@ class RepresentedAir(AbstractField):
 
     def _excess(self, points_nd: Float[Array, "points 3"]) -> Float[Array, " points"]:
         excess_k = self.scales.excess_k * self.fields.at(points_nd).temperature
-        # A step of an optimiser may pass through nonsense: refractivity stays finite above 0 K.
+        # An optimiser may try temperatures near 0 K: refractivity must stay finite.
         return self.air.excess_refractivity(jnp.maximum(excess_k, -0.8 * self.air.ambient_temperature_k))
 
 

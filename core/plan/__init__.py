@@ -1,1 +1,1 @@
-"""Before anybody measures: what this rig would see of this room, what it would not, and at what price."""
+"""Before measuring: what this rig would see of this room, what it would miss, and what a solve would cost."""

@@ -1,9 +1,9 @@
-"""One resolved `auto`, and the share of the noise that a choice may cost."""
+"""One resolved `auto`: its error bound against a share of the noise."""
 
 from dataclasses import dataclass
 from typing import Any
 
-# A choice may cost the shift a tenth of one window's noise.
+# A choice may change the shift by a tenth of one window's noise.
 SHARE = 0.1
 # A bound from a leading term is doubled for the terms left out.
 SAFETY = 2.0
@@ -11,7 +11,7 @@ SAFETY = 2.0
 
 @dataclass(frozen=True)
 class Choice:
-    """One resolved `auto`: its bound and the limit it was held against, and cost as a share of the dearest."""
+    """One resolved `auto`: its error bound, the limit of that, and its cost as a share of the dearest choice's."""
 
     name: str
     value: Any

@@ -1,11 +1,10 @@
-"""What each preset costs and finds, before it runs: work counted from the scene, speed from this machine.
+"""The cost of each preset before it runs: work counted from the scene, speed from this machine.
 
     seconds = fixed + rate * work,      memory = fixed + rate * size
 
 Work is a count of the dominant loop: windows and vertices of the normal equations (draft), cell-steps of
-every march (standard, reference), cells (grid), iterations (paper). `airlens bench calibrate` measures the
-two numbers of each preset on a machine. The error expected is the one that the reference rooms showed for
-that information, times the expected flow's own departures.
+every march (standard, reference), cells (grid), iterations (paper). `airlens bench calibrate` measures both lines of
+each preset on a machine.
 """
 
 from dataclasses import dataclass
@@ -23,13 +22,13 @@ from core.solve.recipes import PAPER_STEPS
 
 # Iterations of `draft` without a plane over those with one: 55 over 35, median of six rooms.
 _FREE_PROFILE = 1.5
-# Corrections of a fine room before none gains any more, its walls stated or not.
+# Usual number of rounds of the fit on the fine grid, with stated and with unknown walls.
 _STATED_ROUNDS, _UNKNOWN_ROUNDS = 3, 6
 
 
 @dataclass(frozen=True)
 class Work:
-    """How much a preset would do, and how large its arrays are, in the units of its own loop."""
+    """The work of a preset and the size of its arrays, in units of its own loop."""
 
     loops: float
     size: float
@@ -69,12 +68,12 @@ def room_work(problem: Problem, flow: ExpectedFlow, settings: RoomSettings) -> W
     fine = room(scene, settings.cells, closure_name(scene))
     prior = room_prior(problem, coarse.layout)
     restarts = (1 + len(prior.active())) * settings.restart_s
-    # Walls that nobody has stated move far: derivatives are made again, and corrections go on.
+    # Unknown walls move far: Jacobians are computed anew, and the fit takes more rounds.
     far = bool(prior.unknown_walls())
     rounds = min(settings.rounds, _UNKNOWN_ROUNDS if far else _STATED_ROUNDS)
-    # One coarse correction that is tried, and the second closure's run, beside the Jacobian's.
+    # Beside the Jacobian: one round on the coarse grid, and the run under another closure.
     coarse_s = settings.settle_s + (1 + settings.renewals * far) * restarts + 2 * settings.restart_s
-    # The room as stated, each round, and two marches that are held.
+    # The room as stated, each round, and two marches that hold the level of T.
     fine_s = (2 + rounds) * settings.refine_s + settings.final_s
     steps = flow.turnover_ratio / flow.step_s * flow.cell_m
     loops = 0.0

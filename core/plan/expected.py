@@ -1,7 +1,7 @@
-"""The air that a scene leads one to expect: enough for the size and the shape of a shift, not for more.
+"""The flow that a scene lets one expect: good enough for the size and shape of a shift.
 
-Where supply or heaters are stated the room is marched coarsely (seconds); otherwise a plume of the
-largest known contrast stands in the middle of the room. Validity: a factor of about 1.5 in the shift.
+If a supply or heaters are stated the room is marched on a coarse grid (seconds); otherwise a plume of the largest
+known contrast stands in the middle of the room. The shift is right within a factor of about 1.5.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ _VERTICES = 33
 
 @dataclass(frozen=True)
 class ExpectedFlow:
-    """Excess temperature on a vertex grid, in words where it comes from, and its turnover_ratio where it was marched.
+    """Excess temperature on a vertex grid, and in words where it comes from; the rest if it was marched.
 
     `step_s` is the longest stable time step on cells of `cell_m`, for the cost of finer marches.
     """
@@ -106,7 +106,7 @@ def _marched(problem: Problem) -> ExpectedFlow:
     prior = room_prior(problem, coarse.layout)
     done = run_as_stated(coarse, prior, problem, _COARSE, shape, lambda _: None)
     excess = _without_layers(np.asarray(done.fields.excess_k, np.float64))
-    # A coarse march that has not settled may overshoot; air is between what drives it.
+    # A short coarse march may overshoot: the air is no warmer, and no colder, than what drives it.
     stated = [0.0, *_stated_excesses_k(problem)]
     excess = np.clip(excess, min(stated), max(stated))
     step_s = float(longest_step_s(done.flow.last, coarse.model(prior.mean), MarchSettings().courant))
@@ -125,7 +125,7 @@ def _marched(problem: Problem) -> ExpectedFlow:
 
 
 def _without_layers(excess_k: Volume) -> Volume:
-    """Wall vertices as their neighbours: a thermal layer fills less than a cell, and less than a window."""
+    """Wall vertices get their neighbours' values: a thermal layer is thinner than a cell and than a window."""
     return np.pad(excess_k[1:-1, 1:-1, 1:-1], 1, mode="edge")
 
 

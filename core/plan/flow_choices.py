@@ -14,9 +14,9 @@ _GRID_SHARE = 0.025
 
 
 def grid(scene: Scene, flow: ExpectedFlow) -> Choice:
-    """Trilinear cells lose their curvature: rms of h^2 / 8 times the second differences across the view.
+    """The coarsest grid whose trilinear cells lose little: h^2 / 8 times the second derivatives across the view.
 
-    The limit is a fortieth of the departures: half of it already shows in a draft of the reference rooms.
+    The limit is a fortieth of the rms departures of T from its mean at each height.
     """
     departure = flow.excess_k - flow.excess_k.mean(axis=(0, 1))
     limit_k = _GRID_SHARE * float(departure.std())

@@ -1,4 +1,4 @@
-"""The same choices after measuring: the shift and its noise as they were found, not as they were expected."""
+"""The same choices after measuring, by the measured shift and its noise."""
 
 import numpy as np
 from jaxtyping import Float32

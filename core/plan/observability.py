@@ -1,7 +1,7 @@
-"""What one view cannot see: the spectrum of the straight-ray operator against the noise.
+"""Observability: which patterns of temperature the views determine, by the straight-ray operator's spectrum.
 
 On a coarse vertex grid the excess temperature has a smooth Gaussian prior with covariance L L^T. The
-singular values s of  W^1/2 A L  say how far each mode stands out of the noise; s > 1 is seen. The share
+singular values s of  W^1/2 A L  are the signal to noise of each mode; a mode with s > 1 is seen. The share
 of the prior's variance that a set of measurements removes is  1 - tr(posterior) / tr(prior).
 Cost: one dense singular value decomposition of some 600 unknowns.
 """

@@ -1,4 +1,4 @@
-"""Aperture cone, data term, window and precision: the leading term of the error that each choice makes."""
+"""Aperture cone, data term, window and precision, by the leading term of each one's error."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from core.plan.choice import SAFETY, SHARE, Choice
 from core.plan.signal import Signal
 from core.scene import Scene
 
-# Relative error of a float32 shift (README, Rays and images), doubled.
+# Relative error of a float32 shift (core/README.md, Rays and images), doubled.
 _FLOAT32 = 2e-6
 
 

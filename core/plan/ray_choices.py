@@ -85,7 +85,7 @@ def tracing(probe: Probe, cells: int) -> tuple[str, int, list[Choice]]:
 
     kind = given
     if given == "auto":
-        # Its error beyond steps is the model's own: what more steps cannot mend.
+        # With the most steps only the model's own error is left.
         kind = "straight" if bound_of("straight", counts[-1]) <= probe.limit_px else "nonlinear"
     count, bound = _fewest(counts, lambda count: bound_of(kind, count), probe.limit_px)
     return kind, count, _tracing_choices(bound, kind, count, probe, dearest)

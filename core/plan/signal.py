@@ -1,4 +1,4 @@
-"""The shift that a view would see, against its noise: map, percentiles, and what would help.
+"""The expected shift of a view against its noise: map, percentiles, and what would help.
 
 Signal to noise is that of one window at the 99th percentile of the shift. The shift is linear in the
 contrast while that is small against T0, falls with the noise's square root of frames, and grows with the
@@ -18,7 +18,7 @@ from core.rays.visibility import sees_wall
 from core.scene import FixedTexture, ProjectedPattern, Scene
 from core.setting import SettingError
 
-# A flow is called visible from here on: one window in a hundred stands out by three deviations.
+# A flow is visible if the 99th percentile of its shift is three standard deviations of a window.
 VISIBLE = 3.0
 _MOST_WINDOWS = 3000
 _ASSUMED_BASELINE_M = 1.0

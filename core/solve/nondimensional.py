@@ -1,4 +1,4 @@
-"""A scene without dimensions: its scales, its numbers, its box."""
+"""A scene in nondimensional form: scales, Re, Pe, Ri, and the box."""
 
 from typing import NamedTuple
 
