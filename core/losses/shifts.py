@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from core.air import Air
-from core.displacement import similarity_basis
+from core.drift import similarity_basis
 from core.losses.boussinesq import Scales
 from core.losses.physics import Rows
 from core.losses.representation import Fields, Spans, Unknowns
