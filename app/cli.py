@@ -3,38 +3,52 @@
 Exit status: 0 done, 1 failed, 2 bad usage or input, 130 interrupted.
 """
 
-import importlib
-import pkgutil
+import importlib.metadata
+import os
 import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
-import app.commands
+import app
+from app.commands import COMMANDS
+from app.commands.lazy import lazy_group
 from app.errors import AirlensError, BadInputError
 from app.files.compilation_cache import use_compilation_cache
-from core.setting import SettingError
-from drivers.errors import DeviceError
+
+PACKAGES = ("calibration", "core", "drivers")
 
 
 def create_cli() -> typer.Typer:
-    """Build the command line from every module in `app.commands`."""
+    """Build the command line: its commands are imported when they are run."""
     cli = typer.Typer(
+        cls=lazy_group(COMMANDS),
         name="airlens",
         help="See and measure the air in a room with one camera and one projector.",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
     )
-    for module in sorted(m.name for m in pkgutil.iter_modules(app.commands.__path__)):
-        importlib.import_module(f"app.commands.{module}").register(cli)
+    cli.callback()(_airlens)
     return cli
 
 
 def main() -> None:
     """Run the command line; every foreseen error ends in one sentence on standard error."""
+    # No process that is started from here imports from the folder that the operator stands in.
+    os.environ["PYTHONSAFEPATH"] = "1"
     use_compilation_cache()
     try:
+        check_packages()
+        from calibration.errors import CalibrationError
+        from core.setting import SettingError
+        from drivers.errors import DeviceError
+    except AirlensError as error:
+        _fail(str(error), 1)
+    try:
         create_cli()()
-    except (BadInputError, SettingError) as error:
+    except (BadInputError, CalibrationError, SettingError) as error:
         _fail(str(error), 2)
     except (AirlensError, DeviceError) as error:
         _fail(str(error), 1)
@@ -42,6 +56,32 @@ def main() -> None:
         _fail(f"{error.strerror or error}: {error.filename or ''}. Nothing half-written was kept.", 1)
     except KeyboardInterrupt:
         _fail("Interrupted. What was finished before is kept; nothing half-written is.", 130)
+
+
+def check_packages() -> None:
+    """Raise AirlensError where another program's `core`, `drivers` or `calibration` would be imported."""
+    home = Path(app.__file__).resolve().parent.parent
+    for name in PACKAGES:
+        found = find_spec(name)
+        place = Path(found.origin).resolve() if found and found.origin else None
+        if place is None or place.parent.parent != home:
+            raise AirlensError(
+                f"The package {name!r} was found at {place}, not in {home}: another program's is in the way. "
+                "Install airlens into an environment of its own, or take that folder off PYTHONPATH."
+            )
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"airlens {importlib.metadata.version('airlens')}")
+        raise typer.Exit
+
+
+def _airlens(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_version)
+    ] = False,
+) -> None: ...
 
 
 def _fail(message: str, status: int) -> None:

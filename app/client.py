@@ -25,7 +25,7 @@ from app.api.models.guide import GuideResource, StepText
 from app.api.models.jobs import Curves, JobResource
 from app.api.models.problem import MEDIA_TYPE, Problem
 from app.api.models.projector import ProjectorResource, WireLine
-from app.api.models.results import ComparisonResource, PresetResource, ResultLine, ResultResource
+from app.api.models.results import ComparisonResource, Form, PresetResource, ResultLine, ResultResource
 from app.api.models.screen import PatternName, ScreenResource
 from app.api.models.shift import ShiftResource
 from app.api.models.uploads import Upload
@@ -312,7 +312,7 @@ class Client:
         self,
         experiment: str,
         result: str,
-        form: Literal["nc", "h5", "vti", "csv", "zip", "png"],
+        form: Form,
         file: Path,
     ) -> Path:
         """Write a result as a file for another program."""

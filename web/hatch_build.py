@@ -26,7 +26,7 @@ except ImportError:  # run as a command
 
 
 class CustomBuildHook(Interface):
-    """Hatchling's custom hook: puts the built page into the wheel as `app/page`."""
+    """Hatchling's custom hook: puts the built page into the wheel as its `app/page`."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Build the page; only an editable install may go on without."""
@@ -42,7 +42,7 @@ class CustomBuildHook(Interface):
             self.app.display_warning(f"The operator's page was not built: {explain(error)}")
             return
         if version != "editable":
-            build_data["force_include"][str(DIST)] = "app/page"
+            build_data["force_include"][str(DIST)] = "airlens/app/page"
 
 
 def build() -> None:

@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 
@@ -26,6 +25,8 @@ def displacement(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Estimate the shift field between two pictures (TIFF or PNG), with its uncertainty."""
+    import numpy as np
+
     from app.files.durable import write_durably
     from app.files.pictures import read_picture
     from app.report.displacement import shift_field, write_shift_field

@@ -7,6 +7,9 @@ from typing import Annotated, Any
 import typer
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+# Known here by name, so that a shell completes them without what they solve with.
+PRESETS = ("auto", "draft", "standard", "reference", "grid", "paper")
+
 
 def register(cli: typer.Typer) -> None:
     """Add `reconstruct`."""
@@ -18,8 +21,9 @@ def reconstruct(
     preset: Annotated[
         str,
         typer.Option(
+            autocompletion=lambda: list(PRESETS),
             help="How to solve: draft, standard, reference, grid, paper; auto is standard where walls and "
-            "supply are stated, else draft."
+            "supply are stated, else draft.",
         ),
     ] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,

@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from pydantic import BaseModel, TypeAdapter
 
-from app.client import Client
 from app.errors import BadInputError
 
 
@@ -28,6 +26,8 @@ def remote(
     ] = "",
 ) -> None:
     """Ask a running service; without a request, list what can be asked. Prints JSON."""
+    from app.client import Client
+
     known = requests()
     if request is None:
         for name, method in known.items():
@@ -46,6 +46,8 @@ def remote(
 
 def requests() -> dict[str, Any]:
     """Return the client's requests by name."""
+    from app.client import Client
+
     return {
         name: method
         for name, method in inspect.getmembers(Client, inspect.isfunction)
@@ -78,6 +80,8 @@ def _answers(answer: Any) -> Iterator[Any]:
 
 
 def _plain(answer: Any) -> Any:
+    from pydantic import BaseModel, TypeAdapter
+
     if isinstance(answer, BaseModel):
         return answer.model_dump()
     if isinstance(answer, bytes):

@@ -27,13 +27,20 @@ def report(
 def export(
     experiment: Annotated[Path, typer.Argument(help="Experiment folder.")],
     kind: Annotated[
-        Literal["nc", "h5", "vti", "csv", "zip", "png"],
-        typer.Option("--format", help="File format; zip is an OpenFOAM case."),
+        Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu"],
+        typer.Option(
+            "--format",
+            help="File format; zip is an OpenFOAM case, ply the surface of one temperature, vtu paths of particles.",
+        ),
     ] = "nc",
     output: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,
     result: Result = None,
+    level_k: Annotated[
+        float | None,
+        typer.Option(help="ply: the surface's temperature [K]; half-way to the extreme by default."),
+    ] = None,
 ) -> None:
-    """Write a result as NetCDF, VTK image data (ParaView), or CSV."""
+    """Write a result for another program: NetCDF, ParaView, CSV, OpenFOAM, a picture, a surface, paths."""
     from app.report.export import export as run
 
-    typer.echo(str(run(experiment, kind, output, result)))
+    typer.echo(str(run(experiment, kind, output, result, level_k)))

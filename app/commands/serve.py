@@ -3,16 +3,14 @@
 import json
 import logging
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.api.factory import create_app
-from app.api.security.settings import LOOPBACK, service_config
-from app.api.security.token import service_token
-from app.api.server import Tls, listen, server_of
 from app.errors import BadInputError
-from app.jobs import attended
+
+if TYPE_CHECKING:
+    from app.api.server import Tls
 
 
 def register(cli: typer.Typer) -> None:
@@ -38,6 +36,12 @@ def serve(
     as_json: Annotated[bool, typer.Option("--json", help="Print the address as JSON.")] = False,
 ) -> None:
     """Serve the operator's page and the API; prints the address with its token."""
+    from app.api.factory import create_app
+    from app.api.security.settings import service_config
+    from app.api.security.token import service_token
+    from app.api.server import listen, server_of
+    from app.jobs import attended
+
     tls = _tls(tls_certificate, tls_key)
     _check_exposure(host, expose, tls, public_url)
     root = data.resolve()
@@ -54,13 +58,17 @@ def serve(
         server.run(sockets=[bound])
 
 
-def _tls(certificate: Path | None, key: Path | None) -> Tls | None:
+def _tls(certificate: Path | None, key: Path | None) -> "Tls | None":
+    from app.api.server import Tls
+
     if (certificate is None) != (key is None):
         raise BadInputError("Only one of --tls-certificate and --tls-key was given; give both or none.")
     return Tls(str(certificate), str(key)) if certificate and key else None
 
 
-def _check_exposure(host: str, expose: bool, tls: Tls | None, public_url: str | None) -> None:
+def _check_exposure(host: str, expose: bool, tls: "Tls | None", public_url: str | None) -> None:
+    from app.api.security.settings import LOOPBACK
+
     if public_url is not None and not public_url.startswith("https://"):
         raise BadInputError(f"--public-url is {public_url!r}; expected an https:// address of a proxy.")
     if host in LOOPBACK:

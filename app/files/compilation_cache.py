@@ -12,6 +12,8 @@ import platform
 import sys
 from pathlib import Path
 
+from app.files.user_folders import cache_folder
+
 LARGEST_BYTES = 1_000_000_000
 
 
@@ -33,11 +35,6 @@ def use_compilation_cache() -> Path | None:
         if "jax" in sys.modules:
             sys.modules["jax"].config.update(name, value)
     return folder
-
-
-def cache_folder() -> Path:
-    """The user's cache folder for this program (XDG)."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "airlens"
 
 
 def prune(folder: Path, largest_bytes: int) -> None:

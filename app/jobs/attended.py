@@ -46,7 +46,7 @@ def stop_with_parent(stop: threading.Event) -> None:
 
 
 def _attend(folder: Path, stop: threading.Event) -> None:
-    command = [sys.executable, "-m", "app.jobs", str(folder), "--with-parent"]
+    command = [sys.executable, "-P", "-m", "app.jobs", str(folder), "--with-parent"]
     variables = {name: value for name, value in os.environ.items() if "TOKEN" not in name}
     while not stop.is_set():
         with open(folder / SUPERVISOR_LOG, "ab") as log:

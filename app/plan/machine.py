@@ -1,6 +1,6 @@
 """How fast this machine is: two numbers a preset, measured once by `airlens bench calibrate`.
 
-Kept in the user's cache folder (XDG Base Directory Specification), or where AIRLENS_MACHINE says. Without a
+Kept in the user's cache folder, or where AIRLENS_MACHINE says. Without a
 measurement the packaged figures of the machine that the README's were taken on serve, and the plan says so.
 """
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from app.errors import BadInputError
 from app.files.durable import write_json
 from app.files.toml import Strict, parse, to_plain
+from app.files.user_folders import cache_folder
 from core.plan.cost import Speed
 
 REFERENCE = Path(__file__).resolve().parent / "tradeoff" / "machine.json"
@@ -27,10 +28,7 @@ class Machine(Strict):
 def machine_path() -> Path:
     """Where this machine's figures are kept."""
     named = os.environ.get("AIRLENS_MACHINE")
-    if named:
-        return Path(named)
-    cache = os.environ.get("XDG_CACHE_HOME")
-    return (Path(cache) if cache else Path.home() / ".cache") / "airlens" / "machine.json"
+    return Path(named) if named else cache_folder() / "machine.json"
 
 
 def this_machine() -> tuple[Machine, str]:

@@ -1,6 +1,12 @@
-"""`export`: a result as NetCDF (or HDF5), VTK image data, CSV, an OpenFOAM case, or a picture."""
+"""`export`: a result for another program.
+
+NetCDF (or HDF5), VTK image data, CSV, an OpenFOAM case, a picture, the surface of one temperature (PLY), or paths of
+particles (VTK).
+"""
 
 import shutil
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,22 +19,41 @@ from app.experiment.results import read_result, to_dataset
 from app.files.durable import write_durably
 from app.report.figures import as_png, slices_figure
 from app.report.openfoam import write_openfoam
+from app.report.paths import write_vtu
+from app.report.surface import write_ply
 from core.result import Solution
 
-ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png"]
+ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu"]
 
 
-def export(folder: Path, kind: ExportFormat, output: Path | None = None, result: Path | None = None) -> Path:
+def export(
+    folder: Path,
+    kind: ExportFormat,
+    output: Path | None = None,
+    result: Path | None = None,
+    level_k: float | None = None,
+) -> Path:
     """Write the newest (or the given) result in another format and return the file. Raises BadInputError."""
     experiment = open_experiment(folder)
     source = (result or experiment.latest_result()) / "result.nc"
     path = output or source.with_name(f"result-export.{kind}")
     if path.suffix != f".{kind}":
         raise BadInputError(f"The output is {path.name}; expected a name that ends in .{kind}.")
+    if level_k is not None and kind != "ply":
+        raise BadInputError(
+            f"A level was given for {kind}; only ply, the surface of one temperature, has one."
+        )
     if kind in ("nc", "h5"):  # NetCDF-4 is HDF5
         write_durably(path, lambda temporary: shutil.copyfile(source, temporary))
     else:
-        writers = {"vti": _write_vti, "csv": _write_csv, "zip": write_openfoam, "png": _write_png}
+        writers: dict[str, Callable[[Path, Solution], object]] = {
+            "vti": _write_vti,
+            "csv": _write_csv,
+            "zip": write_openfoam,
+            "png": _write_png,
+            "vtu": write_vtu,
+        }
+        writers["ply"] = partial(write_ply, level_k=level_k)
         writer = writers[kind]
         solution = read_result(source)
         write_durably(path, lambda temporary: writer(temporary, solution))

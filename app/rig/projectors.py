@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+from app.files.user_folders import state_folder
 from drivers.projector.link import ProjectorLink
 from drivers.projector.open import open_projector
 
@@ -17,4 +18,4 @@ def open_real_projector(url: str) -> ProjectorLink:
 def lamp_journal(url: str) -> Path:
     """Return the file that remembers when this projector's lamp was lit and put out."""
     name = "".join(c if c.isalnum() else "-" for c in url)
-    return Path.home() / ".local" / "state" / "airlens" / f"lamp-{name}.json"
+    return state_folder() / f"lamp-{name}.json"

@@ -5,7 +5,7 @@ from typing import Any, Literal
 from app.api.models.strict import Strict
 
 Kind = Literal["found", "uncertainty", "truth", "error"]
-Form = Literal["nc", "h5", "vti", "csv", "zip", "png"]
+Form = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu"]
 
 
 class PresetResource(Strict):

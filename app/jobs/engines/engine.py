@@ -35,7 +35,7 @@ class Launch:
     def worker_arguments(self) -> list[str]:
         """The command after `python`."""
         attempt, lease_s = str(self.attempt), str(self.lease_s)
-        return ["-m", "app.worker", str(self.folder), "--attempt", attempt, "--lease-s", lease_s]
+        return ["-P", "-m", "app.worker", str(self.folder), "--attempt", attempt, "--lease-s", lease_s]
 
 
 @runtime_checkable
