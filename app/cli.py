@@ -41,11 +41,17 @@ def main() -> None:
     use_compilation_cache()
     try:
         check_packages()
-        from calibration.errors import CalibrationError
-        from core.setting import SettingError
-        from drivers.errors import DeviceError
     except AirlensError as error:
         _fail(str(error), 1)
+    _run()
+
+
+def _run() -> None:
+    # Imported here: only now is it known that these are ours.
+    from calibration.errors import CalibrationError
+    from core.setting import SettingError
+    from drivers.errors import DeviceError
+
     try:
         create_cli()()
     except (BadInputError, CalibrationError, SettingError) as error:

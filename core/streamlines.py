@@ -7,6 +7,8 @@ ones in a jet, and its leaving through a wall's opening is found as a root, not 
 these are the paths of the mean flow, so the times are those of a tracer that does not spread.
 """
 
+from typing import Any, cast
+
 import diffrax
 import equinox as eqx
 import jax
@@ -14,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix
 from jax.scipy.ndimage import map_coordinates
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PyTree
 
 from core.result import Solution
 
@@ -77,11 +79,11 @@ def _follow(
     cells = jnp.asarray(velocity_m_s.shape[:3], jnp.float64) - 1.0
     components = jnp.moveaxis(velocity_m_s, -1, 0)
 
-    def rate(_: Array, at_m: Array, __: None) -> Array:
+    def rate(time_s: Any, at_m: Any, nothing: PyTree) -> Array:
         index = list((at_m - low_m) / (high_m - low_m) * cells)
         return jnp.stack([map_coordinates(part, index, order=1, mode="nearest") for part in components])
 
-    def depth(_: Array, at_m: Array, __: None, **___: object) -> Array:
+    def depth(time_s: Any, at_m: Any, nothing: PyTree, **state: Any) -> Array:
         """How far within the room, as a share of it; zero on a wall."""
         return jnp.min(jnp.minimum(at_m - low_m, high_m - at_m) / (high_m - low_m))
 
@@ -101,7 +103,7 @@ def _follow(
             max_steps=MAX_STEPS,
             throw=False,
         )
-        ends, rows = solved.ts, solved.ys
-        return ends[0][-1], rows[1], solved.event_mask
+        ends_s, rows_m = cast(tuple[Array, Array], solved.ts), cast(tuple[Array, Array], solved.ys)
+        return ends_s[0][-1], rows_m[1], cast(Array, solved.event_mask)
 
     return jax.vmap(one)(starts_m)

@@ -38,7 +38,9 @@ def lazy_group(table: Mapping[str, tuple[str, str]]) -> type[TyperGroup]:
         def __init__(
             self, *, commands: Mapping[str, Any] | Sequence[Any] | None = None, **named: Any
         ) -> None:
-            known = {name: Deferred(name, module, about) for name, (module, about) in table.items()}
+            known: dict[str, Any] = {
+                name: Deferred(name, module, about) for name, (module, about) in table.items()
+            }
             super().__init__(commands=known, **named)
 
     return LazyGroup
