@@ -8,6 +8,7 @@ from itertools import combinations
 from typing import Literal
 
 import numpy as np
+from scipy.interpolate import RegularGridInterpolator
 
 from core.geometry import WALLS, WallName, face_of
 from core.problem import PlaneData, Problem
@@ -109,16 +110,15 @@ def refuse_contradicted(part: Inlet | Heater, plane: PlaneData, ambient_k: float
     """
     if part.patch.wall != plane.wall:
         return
-    inside = []
-    for axis_m, low, high in zip(
-        (plane.first_m, plane.second_m), part.patch.lower_m, part.patch.upper_m, strict=True
-    ):
-        quarter = (high - low) / 4
-        inside.append((axis_m > low + quarter) & (axis_m < high - quarter))
-    found = plane.temperature_k[np.ix_(*inside)]
-    if found.size == 0:
-        return
-    measured_k = float(np.median(found))
+    axes_m = (plane.first_m, plane.second_m)
+    places_m = [
+        np.clip(np.linspace(low + 0.25 * (high - low), high - 0.25 * (high - low), 5), axis_m[0], axis_m[-1])
+        for axis_m, low, high in zip(axes_m, part.patch.lower_m, part.patch.upper_m, strict=True)
+    ]
+    found_k = RegularGridInterpolator(axes_m, plane.temperature_k)(
+        np.stack(np.meshgrid(*places_m, indexing="ij"), -1)
+    )
+    measured_k = float(np.median(found_k))
     if abs(measured_k - part.temperature_k) > 1.0 + 0.25 * abs(part.temperature_k - ambient_k):
         raise SettingError(
             f"The {part.kind} on {plane.wall} is stated at {part.temperature_k:g} K, and the plane {plane.wall} "

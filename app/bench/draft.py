@@ -14,12 +14,12 @@ from app.volume.file import RoomVolume, read_volume
 from app.volume.measurement import synthetic_problem
 from app.volume.scene import Information, RigOptions
 from app.volume.score import score_solution, values_at
+from core.known import leaving_excess_k
 from core.metrics import inner, rms
 from core.problem import Problem
 from core.result import Solution
 from core.solve.check import check_problem
 from core.solve.draft.draft import solve_draft
-from core.solve.nondimensional import measured_outlets
 
 # The default rig at each level of information; the projector far away as in the paper and as near as a room
 # allows, with and without the plane.
@@ -80,10 +80,11 @@ def draft(
 
 def _outlet_everywhere_k(problem: Problem, truth: RoomVolume) -> float | None:
     """What costs nothing without a plane: the air that leaves, everywhere."""
-    leaving = measured_outlets(problem)
-    if not leaving:
+    leaving_k = leaving_excess_k(problem)
+    if leaving_k is None:
         return None
-    return round(float(rms(inner(truth.temperature_k) - leaving[0][1])), 4)
+    everywhere_k = problem.scene.air.ambient_temperature_k + leaving_k
+    return round(float(rms(inner(truth.temperature_k) - everywhere_k)), 4)
 
 
 def _within(found: Solution, truth: RoomVolume) -> float | None:

@@ -7,7 +7,7 @@ import numpy as np
 from core.geometry import Box, looking_along_y
 from core.known_temperature import VertexGrid, known_temperature
 from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
-from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, SolveModel, View, Wall
+from core.scene import FixedTexture, Heater, Inlet, Outlet, Patch, Scene, SolveModel, View, Wall
 from core.solve.check import check_problem
 from core.solve.draft.draft import draft_grid, solve_draft
 from tests.extremes.row import Near, Refused, Row, Within, extremes, prove
@@ -146,7 +146,9 @@ ROWS = [
     checked("supply that leaves", "does not enter the room", known=(replace(INLET, velocity_m_s=(-0.5, 0.0, 0.0)),)),
     checked("an inlet on an outlet", "overlap", known=(INLET, Outlet(patch=PATCH))),
     known("a plane", Near(300.0), planes=[plane(300.0)]),
-    known("an inlet against its plane", Refused("Correct the one that is wrong"), INLET, planes=[plane(T0)]),
+    checked("an inlet against its plane", "Correct the one that is wrong", known=(INLET,), planes=[plane(T0)]),
+    checked("a heater against its plane", "Correct the one that is wrong", planes=[plane(T0)],
+            known=(Heater(patch=PATCH, temperature_k=320.0),)),
     known("an inlet alone", Near(303.15), INLET),
     known("an outlet smaller than a cell", Near(299.0),
           Outlet(patch=Patch(wall="x_max", lower_m=(1.0, 1.0), upper_m=(1.001, 1.001)), mean_temperature_k=299.0)),
