@@ -20,7 +20,7 @@ from core.setting import SettingError, setting
 from core.solve.nondimensional import Frame, height_profile
 
 Regime = Literal["bos+boundary", "pde+boundary", "bos+pde+boundary"]
-# Slopes of room air that a smoothness belief allows, as in the `draft` preset.
+# Prior slopes of T across and along the view.
 _ACROSS_K_M, _ALONG_K_M = 30.0, 1.0
 REGIMES: tuple[Regime, ...] = ("bos+boundary", "pde+boundary", "bos+pde+boundary")
 
@@ -32,7 +32,7 @@ class Weights:
     Each loss is a mean of squares: of errors over the noise, of errors over the largest boundary value,
     of dimensionless residuals. λ is therefore one over the mean square at which a term is satisfied:
     one sigma of noise, about a hundredth of the boundary values, a few hundredths of U²/L. `smoothness`
-    is a belief about slopes of T (30 K/m across the view, 1 K/m along it), a hundredth of the images' say.
+    weighs a prior on the slopes of T (30 K/m across the view, 1 K/m along it), about a hundredth of the images.
     """
 
     bos: float = 1.0
@@ -44,7 +44,7 @@ class Weights:
 
 @setting
 class DataModel:
-    """What the data term leaves out or cannot represent.
+    """Which windows the data term leaves out, and its representation error.
 
     `representation` is the part of the shifts' size that the model's grid cannot hold, added to the
     noise. Windows whose shift is `outlier` times the typical one (a thermal layer beside a wall, thinner
@@ -135,7 +135,7 @@ def traced_loss(problem: Problem, frame: Frame, weight: float, data: DataModel, 
 
 
 def _inner(rows: ShiftRows, scene: Scene, view: int, pair: ImagePair, data: DataModel) -> ShiftRows:
-    """The rows of the pixels beside which there is no layer thinner than a cell."""
+    """The rows of the pixels away from the walls and their thermal layers."""
     centres_px = pixel_centres(*pair.flow_image.shape)
     used = _away_from_walls(scene, view, centres_px, data.margin, np.ones(len(centres_px), bool))
     return rows.chosen(jnp.asarray(np.flatnonzero(used)))
@@ -150,7 +150,7 @@ def _windows(problem: Problem, view: int, data: DataModel, shape: tuple[int, int
 
 
 def _kept_windows(problem: Problem, view: int, data: DataModel) -> tuple[ShiftMeasurement, float]:
-    """Windows that this model can hold, and its representation error in px."""
+    """Windows that the grid can represent, and the representation error in px."""
     shift = problem.shifts[view]
     used, model_std_px = _usable(shift, data)
     used = _away_from_walls(problem.scene, view, shift.centres_px, data.margin, used)
@@ -167,7 +167,7 @@ def _usable(shift: ShiftMeasurement, data: DataModel) -> tuple[np.ndarray, float
     """Windows to keep, and the representation error in px."""
     size = np.linalg.norm(shift.displacement_px, axis=1)
     noise = np.sqrt(np.trace(np.linalg.inv(shift.information_per_px2), axis1=1, axis2=2))
-    # Windows without texture first: beside the wall they draw shifts of hundreds of pixels.
+    # First without windows that have no texture: beside the wall those give shifts of hundreds of pixels.
     textured = noise < 1.0
     seen = size[textured]
     typical = float(np.sqrt(np.mean(np.minimum(seen, np.percentile(seen, 90)) ** 2)))

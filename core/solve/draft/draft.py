@@ -42,7 +42,7 @@ def _widened(leaf: Array) -> Array:
 
 
 def draft_grid(scene: Scene) -> VertexGrid:
-    """48 cells along the room's longest side, cubes but for the view's axis: a third, for nothing is seen there."""
+    """48 cells along the room's longest side; along the view, where images see nothing, a third as many."""
     size = scene.room.size_m
     longest = 48 if scene.solve.grid == "auto" else scene.solve.grid
     spacing = max(size) / longest

@@ -1,10 +1,9 @@
-"""What `draft` believes of the temperature before it looks at the pictures, and what a window weighs.
+"""The prior of `draft`, and the weights of its windows.
 
-The prior is the known plane's profile over height carried away from its wall. Without a plane the level is that of
-the thermometers, and the profile is free but for the range of the air that is known. The size of departures is
-the one at which smooth random fields move the pattern as far as it moved (moment matching): a cool room is not
-given a hot room's freedom, and a projector beside the camera, which hardly sees broad fields, is not believed
-about them.
+The prior mean is the known plane's profile over height, the same in the whole room. Without a plane the thermometers
+give the level, and the profile is free within the range of the air that is known. The prior's size is the one at
+which smooth random fields move the pattern as far as it has moved (moment matching). So a cool room gets a small
+prior, and broad fields, which a projector beside the camera hardly sees, stay near the prior.
 """
 
 import numpy as np
@@ -23,7 +22,7 @@ from core.solve.draft.temperature_system import ShiftOperator, Volume
 # A thousandth of a kelvin, as excess refractivity.
 _LEAST_SIZE = 1e-9
 _LEAST_RANGE_K = 0.1
-# A profile rises by anything between nothing and the range of the air that is known: half of it, give or take.
+# A profile rises by something between nothing and the range of the air that is known: the mean and deviation of that.
 _RISE, _RISE_STD = 0.5, 12**-0.5
 _DRAWS = 4
 
@@ -34,8 +33,8 @@ class TemperatureSettings:
 
     `across` and `along` are across and along the view; `representation` is the part of the shift's size
     that this grid cannot represent, added to the noise. The deviations come from `draws` draws of the
-    posterior (none: no deviations), in which windows count `together` times fewer: what a grid cannot hold
-    is wrong in neighbours alike. Twelve is the room solver's.
+    posterior (none: no deviations), in which so many windows count as one: what a grid cannot represent is wrong
+    in neighbouring windows alike.
     """
 
     across: float = 0.04
@@ -48,14 +47,14 @@ class TemperatureSettings:
 
 
 def profile_weight(reach: float, grid: VertexGrid) -> float:
-    """One over the variance of a step of the profile from one level to the next: a walk as wide as its rise."""
+    """One over the variance of the profile's step from one height to the next, as of a random walk."""
     return (grid.shape[2] - 1) / (_RISE_STD * reach) ** 2
 
 
 def level_k(known: KnownTemperature, prior_k: Volume) -> float:
-    """What thermometers and outlets read above the prior, where no plane says how warm the room is.
+    """Mean of the thermometers' and outlets' readings above the prior; 0 where a plane gives the level.
 
-    Pictures do not see the level, and the prior's size is theirs: it must not pull the level to ambient.
+    Images do not see the level, so a prior of the size that they give must not pull it to ambient.
     """
     if known.mask.any() or not known.means:
         return 0.0
@@ -65,13 +64,13 @@ def level_k(known: KnownTemperature, prior_k: Volume) -> float:
 
 
 def prior_temperature(problem: Problem, grid: VertexGrid) -> Volume:
-    """The first known plane's profile over height carried through the room; without a plane the outlets' and
-    sensors' mean (ambient where there are none), rising over the height by half the range of the air that is known.
+    """The first known plane's profile over height, the same everywhere.
 
-    Only the profile is carried: a jet in the plane is somewhere else a metre further on. Warm air lies on cold:
-    a room's profile rises by anything from nothing to that range, and a rig that does not see it gets the middle.
+    Without a plane: the mean of outlets and sensors (ambient if there are none), rising over the height by half of
+    the range of the air that is known, since warm air lies on cold. Of a plane only the profile is used, since a jet
+    in it is somewhere else a metre further on.
     """
-    # What leaves the room has its mean temperature: without it the prior would draw a warm room to ambient.
+    # The outflow has about the room's mean temperature; without it a warm room would be pulled to ambient.
     measured = [kelvin for _, kelvin, _ in known_temperature(problem, grid).means]
     level = float(np.mean(measured)) if measured else problem.scene.air.ambient_temperature_k
     rise_k = _RISE * profile_range_k(problem) if len(known_air_k(problem)) > 1 else 0.0
@@ -98,7 +97,7 @@ def known_air_k(problem: Problem) -> list[float]:
 
 
 def profile_range_k(problem: Problem) -> float:
-    """How far a room's profile over height may reach: from the coldest to the hottest air that is known."""
+    """From the coldest to the hottest air that is known: the most that a profile over height may span."""
     kelvin = known_air_k(problem)
     if len(kelvin) < 2:
         kelvin.append(problem.scene.air.ambient_temperature_k)
@@ -129,18 +128,18 @@ def prior_size(
         unit += float(np.mean([_most(operator.apply(d / d.std())[used]) for d in draws]))
     if unit == 0.0:
         return _LEAST_SIZE
-    # No less than a tenth of what noise alone would look like: zero would forbid every departure.
+    # At least a tenth of what noise alone gives: a size of zero would forbid every departure.
     return max(float(np.sqrt(max(seen - noise, 0.01 * noise) / unit)), _LEAST_SIZE)
 
 
 def _most(shifts_px: Float[np.ndarray, "windows 2"]) -> float:
-    """Sum of squares without the largest tenth: thermal layers move the pattern more than the room's air."""
+    """Sum of squares without the largest tenth, which are thermal layers at walls."""
     squares = np.sum(shifts_px**2, axis=1)
     return float(squares[squares <= np.percentile(squares, 90)].sum()) if len(squares) else 0.0
 
 
 def lengths_m(grid: VertexGrid, settings: TemperatureSettings) -> tuple[float, float, float]:
-    """Over which n' varies, along x, y, z [m]."""
+    """Correlation lengths of n' along x, y, z [m]."""
     longest_m = max(grid.box.size_m)
     return settings.across * longest_m, settings.along * longest_m, settings.across * longest_m
 
@@ -151,12 +150,12 @@ def excess(air: Air, excess_k: np.ndarray) -> np.ndarray:
 
 
 def data_weight(shift: ShiftMeasurement, representation: float) -> Float[np.ndarray, "windows 2 2"]:
-    """Inverse covariance of noise and representation error; zero for windows far outside the rest."""
+    """Inverse covariance of noise and representation error; zero for outliers."""
     size = np.linalg.norm(shift.displacement_px, axis=1)
     covariance = np.linalg.inv(shift.information_per_px2)
     informed = np.trace(covariance, axis1=1, axis2=2) < 1.0
     typical = float(np.sqrt(np.mean(np.minimum(size, np.percentile(size, 90)) ** 2)))
     weight = np.linalg.inv(covariance + (representation * typical) ** 2 * np.eye(2))
-    # Beside a wall with a thermal layer inside a cell the pattern moves many times further: not this grid's.
+    # Beside a thermal layer thinner than a cell the pattern moves many times further: this grid cannot represent it.
     outlier = size > 12 * typical + 6 * np.sqrt(np.trace(covariance, axis1=1, axis2=2))
     return weight * (informed & ~outlier)[:, None, None]
