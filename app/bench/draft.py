@@ -17,7 +17,6 @@ from app.volume.score import score_solution, values_at
 from core.metrics import inner, rms
 from core.problem import Problem
 from core.result import Solution
-from core.solve.check import check_problem
 from core.solve.draft.draft import solve_draft
 from core.solve.nondimensional import measured_outlets
 
@@ -54,7 +53,6 @@ def draft(
     lines: list[dict[str, Any]] = []
     for name, options, information in CASES:
         problem = synthetic_problem(truth, options, information, window_px=32, seed=0)
-        check_problem(problem, "bos+boundary")
         began = time.process_time()
         found = solve_draft(problem)
         cpu_s = time.process_time() - began
