@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, Protocol
 
 from app.errors import BadInputError
@@ -33,12 +34,18 @@ REFERENCE = RoomSettings(cells=64, coarse_cells=40, restart_s=80.0, rounds=16, r
 
 def solve_standard(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
     """The room marched at 48^3, its boundary corrected by the images: minutes."""
-    return solve_room(problem, STANDARD, on_event=on_event)
+    return solve_room(problem, sized(STANDARD, problem.scene), on_event=on_event)
 
 
 def solve_reference(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
     """The same at 64^3 and longer."""
-    return solve_room(problem, REFERENCE, on_event=on_event)
+    return solve_room(problem, sized(REFERENCE, problem.scene), on_event=on_event)
+
+
+def sized(settings: RoomSettings, scene: Scene) -> RoomSettings:
+    """The settings at the scene's own grid, where it states one; two thirds of it for the coarse room."""
+    cells = scene.solve.grid
+    return settings if cells == "auto" else replace(settings, cells=cells, coarse_cells=2 * cells // 3)
 
 
 PRESETS: Mapping[str, Solve] = {
