@@ -7,3 +7,16 @@ class AirlensError(Exception):
 
 class BadInputError(AirlensError):
     """A file, option or setting that cannot be used: exit status 2."""
+
+
+def explained(error: BaseException) -> str:
+    """What a person should read of an error: a foreseen one says it itself, any other is named with its kind."""
+    from calibration.errors import CalibrationError
+    from core.setting import SettingError
+    from drivers.errors import DeviceError
+
+    if isinstance(error, AirlensError | SettingError | CalibrationError | DeviceError):
+        return str(error)
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.strerror}: {error.filename or 'no file named'}."
+    return f"{type(error).__name__}: {error}."

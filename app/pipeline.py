@@ -1,4 +1,4 @@
-"""The story on one screen: load the calibration, build the scene, check it, measure, solve, keep, report."""
+"""The story on one screen: what is known, the captures, the shift, the problem, the air; kept and told."""
 
 import json
 import time
@@ -10,22 +10,24 @@ from typing import Any
 import numpy as np
 
 from app.capture.checks import aged
+from app.errors import explained
+from app.experiment.captures import newest_pair
 from app.experiment.folder import Experiment, new_id, open_experiment, write_manifest
 from app.experiment.results import write_result
 from app.experiment.shift_files import write_shifts
 from app.files.durable import write_text
 from app.files.provenance import provenance
 from app.files.toml import to_plain
-from app.plan.make import settled
 from app.reconstruct.agreement import rendered_agreement
-from app.reconstruct.measure import Measurement, measure, with_calibration
+from app.reconstruct.measure import Measurement, measure
+from app.reconstruct.presets import AUTO, check_data_term, resolved, solve_with
 from app.reconstruct.presets import preset as preset_called
-from app.reconstruct.presets import resolved, solve_with
+from app.reconstruct.problem import known_of, problem_of
+from app.report.finding import Finding
 from app.report.page import write_report
+from core.problem import Problem
 from core.result import Solution
-from core.solve.check import check_problem
 from core.solve.checkpoint import CheckpointStore
-from core.solve.recipes import regime_for
 
 OnStage = Callable[[str], object]
 OnEvent = Callable[[dict[str, Any]], object]
@@ -33,17 +35,27 @@ OnEvent = Callable[[dict[str, Any]], object]
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """A finished reconstruction: its folder, the air, and what was measured."""
+    """A finished reconstruction: its folder, what was solved, and the air.
+
+    `no_report` says why there is no report, where there is none.
+    """
 
     folder: Path
-    solution: Solution
+    finding: Finding
+    problem: Problem
     measurement: Measurement
     wall_s: float
+    no_report: str = ""
+
+    @property
+    def solution(self) -> Solution:
+        """The air that was found."""
+        return self.finding.solution
 
 
 def reconstruct(
     folder: Path,
-    preset: str = "auto",
+    preset: str = AUTO,
     *,
     on_stage: OnStage = lambda stage: None,
     on_event: OnEvent | None = None,
@@ -58,30 +70,33 @@ def reconstruct(
     """
     started = time.perf_counter()
     experiment = open_experiment(folder)
-    preset = resolved(preset, experiment.settings.scene)
+    on_stage("read what is known")
+    known = known_of(experiment)
+    preset = resolved(preset, known.scene)
     solve = preset_called(preset)
-    on_stage("load the calibration")
-    scene, calibrated = with_calibration(experiment.settings.scene, experiment.bundle_path)
+    check_data_term(preset, known.scene)
+    on_stage("read the captures")
+    captures = newest_pair(experiment)
     on_stage("measure the shift of the pattern")
-    measurement = measure(experiment, scene)
-    check_problem(measurement.problem, regime_for(measurement.problem))
+    measurement = measure(captures, known.scene)
+    problem = problem_of(known, measurement.shifts, measurement.images)
     on_stage("check the rendered reference against the captured one")
-    checked = rendered_agreement(scene, measurement.references)
-    on_stage("settle what auto leaves open")
-    problem, choices = settled(measurement, preset)
+    checked = rendered_agreement(known.scene, captures.reference)
     on_stage(f"solve ({preset})")
     solution = solve_with(solve, problem, on_event=on_event, store=store, should_stop=should_stop)
     on_stage("keep the result")
+    told = [known.optics, *aged(experiment, captures), *measurement.notes, checked, *solution.notes]
     result = into or _new_folder(experiment, preset)
-    told = {
-        "assumed": [calibrated, *aged(experiment), *measurement.notes, checked, *solution.notes],
-        "choices": [to_plain(choice) for choice in choices],
-        "wall_s": time.perf_counter() - started,
-    }
-    _keep(result, experiment, preset, measurement, solution, told)
+    manifest = _manifest(experiment, preset, measurement, solution, told, time.perf_counter() - started)
+    finding = Finding(
+        experiment, result.name, manifest, solution, lambda: measurement.shifts, lambda: captures
+    )
+    _keep(result, finding, measurement)
     on_stage("report")
-    write_report(experiment.folder, result)
-    return Reconstruction(result, solution, measurement, time.perf_counter() - started)
+    no_report = _reported(finding, result)
+    return Reconstruction(
+        result, finding, problem, measurement, time.perf_counter() - started, no_report=no_report
+    )
 
 
 def _new_folder(experiment: Experiment, preset: str) -> Path:
@@ -90,35 +105,55 @@ def _new_folder(experiment: Experiment, preset: str) -> Path:
     return folder
 
 
-def _keep(
-    folder: Path,
+def _manifest(
     experiment: Experiment,
     preset: str,
     measurement: Measurement,
     solution: Solution,
-    told: dict[str, Any],
-) -> None:
-    captures = {role: experiment.latest_capture(role) for role in ("reference", "flow")}
+    assumed: list[str],
+    wall_s: float,
+) -> dict[str, Any]:
+    captures = measurement.captures
+    return {
+        "schema_version": 1,
+        "preset": preset,
+        "outcome": solution.outcome.name,
+        "advice": solution.outcome.value,
+        "solver_s": solution.solver_s,
+        "assumed": assumed,
+        "wall_s": wall_s,
+        "captures": {"reference": captures.reference.folder.name, "flow": captures.flow.folder.name},
+        "windows": [len(shift.displacement_px) for shift in measurement.shifts],
+        "settings": to_plain(experiment.settings),
+        "inputs": captures.inputs,
+        **provenance(),
+    }
+
+
+def _keep(folder: Path, finding: Finding, measurement: Measurement) -> None:
+    """Everything that the result is; its manifest last."""
+    manifest, solution = finding.manifest, finding.solution
     write_result(
         folder / "result.nc",
         solution,
-        {"title": experiment.settings.title, "preset": preset, "assumed": "\n".join(told["assumed"])},
+        {
+            "title": finding.experiment.settings.title,
+            "preset": manifest["preset"],
+            "assumed": "\n".join(manifest["assumed"]),
+        },
     )
-    write_shifts(folder, measurement.problem.shifts)
+    write_shifts(folder, measurement.shifts)
     lines = (json.dumps({k: float(np.float64(v)) for k, v in row.items()}) for row in solution.history)
     write_text(folder / "history.jsonl", "".join(line + "\n" for line in lines))
-    write_manifest(
-        folder,
-        {
-            "schema_version": 1,
-            "preset": preset,
-            "outcome": solution.outcome.name,
-            "advice": solution.outcome.value,
-            "solver_s": solution.solver_s,
-            **told,
-            "captures": {role: path.name for role, path in captures.items()},
-            "windows": [len(shift.displacement_px) for shift in measurement.problem.shifts],
-            "settings": to_plain(experiment.settings),
-        }
-        | provenance({f"{role}_manifest": path / "manifest.json" for role, path in captures.items()}),
-    )
+    write_manifest(folder, dict(manifest))
+
+
+def _reported(finding: Finding, folder: Path) -> str:
+    """Write the report; why there is none where it cannot be written: the result is kept."""
+    try:
+        write_report(finding, folder)
+    except Exception as error:  # whatever stops the page, the result is there
+        return (
+            f"The result is kept; its report could not be written: {explained(error)} Then: airlens report."
+        )
+    return ""

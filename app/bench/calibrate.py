@@ -107,15 +107,15 @@ Prepared = tuple[Work, Callable[[], Solution]]
 
 
 def _problem(grid: int):
+    from app.reconstruct.problem import with_scene
     from app.volume.file import read_volume
     from app.volume.measurement import synthetic_problem
     from app.volume.scene import RigOptions
-    from core.problem import Problem
 
     options = RigOptions(camera_px=(1024, 768))
     made = synthetic_problem(read_volume(SAMPLE_ROOM), options, "surveyed", window_px=16, seed=0)
     scene = replace(made.scene, solve=replace(made.scene.solve, grid=grid))
-    return Problem(scene, made.shifts, made.planes)
+    return with_scene(made, scene)
 
 
 def _draft(cells: int) -> Prepared:

@@ -18,7 +18,6 @@ from core.known import leaving_excess_k
 from core.metrics import inner, rms
 from core.problem import Problem
 from core.result import Solution
-from core.solve.check import check_problem
 from core.solve.draft.draft import solve_draft
 
 # The default rig at each level of information; the projector far away as in the paper and as near as a room
@@ -54,7 +53,6 @@ def draft(
     lines: list[dict[str, Any]] = []
     for name, options, information in CASES:
         problem = synthetic_problem(truth, options, information, window_px=32, seed=0)
-        check_problem(problem, "bos+boundary")
         began = time.process_time()
         found = solve_draft(problem)
         cpu_s = time.process_time() - began

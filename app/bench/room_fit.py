@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import typer
 
+from app.reconstruct.problem import with_scene
 from app.volume.file import RoomVolume, read_volume
 from app.volume.measurement import synthetic_problem
 from app.volume.scene import RIG_PLACES, Information, RigName, RigOptions
@@ -92,7 +93,7 @@ def entered(problem: Problem, wrong: float, closure: str) -> Problem:
     boundary = tuple(mistaken(b) if isinstance(b, Inlet) else b for b in scene.boundary)
     flow = scene.flow if closure == "auto" else FlowModel(transport=closure)  # type: ignore[arg-type]
     changed: Scene = replace(scene, boundary=boundary, flow=flow)
-    return Problem(changed, problem.shifts, problem.planes, problem.sensors)
+    return with_scene(problem, changed)
 
 
 def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dict[str, Any]:

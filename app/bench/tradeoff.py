@@ -17,6 +17,7 @@ import typer
 from app.bench.parts.ray_sweep import ray_sweep
 from app.files.durable import durable_path
 from app.plan.tradeoff import front, off_front, span, table
+from app.reconstruct.problem import with_scene
 from app.volume.file import RoomVolume, read_volume
 from app.volume.measurement import synthetic_problem
 from app.volume.scene import RigOptions
@@ -128,7 +129,7 @@ def solved(point: Point, name: str, truth: RoomVolume, information: str) -> dict
     made = synthetic_problem(truth, options, information, window_px=32, seed=1)  # type: ignore[arg-type]
     cells = point.cells or made.scene.solve.grid
     scene = replace(made.scene, solve=replace(made.scene.solve, grid=cells))
-    problem = Problem(scene, made.shifts, made.planes)
+    problem = with_scene(made, scene)
     try:
         found = _solve(point, problem)
         if found.solver_s < _SHORT_S:

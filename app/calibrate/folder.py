@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.errors import BadInputError
+from app.experiment.calibration import read_bundle
 from app.experiment.folder import ExperimentSettings, open_experiment
 from app.files.durable import write_text
-from calibration.bundle import Bundle, from_json, to_json
+from calibration.bundle import Bundle, to_json
 from calibration.errors import CalibrationError
 from calibration.model import Model
 from calibration.record import Record, record_from_json, record_to_json
@@ -38,13 +39,7 @@ class CalibrationFolder:
 
     def bundle(self) -> Bundle:
         """The bundle so far; an empty one if there is none. Raises BadInputError."""
-        path = self.folder / "bundle.json"
-        if not path.exists():
-            return Bundle(date=now())
-        try:
-            return from_json(path.read_text(encoding="utf-8"), str(path))
-        except (CalibrationError, UnicodeDecodeError) as error:
-            raise BadInputError(str(error)) from error
+        return read_bundle(self.experiment) or Bundle(date=now())
 
     def record(self, camera: str) -> Record | None:
         """What was seen so far. Raises BadInputError."""

@@ -144,7 +144,7 @@ class CalibrationDesk:
     def _stage(self, experiment: Experiment, plan: LivePlan) -> Iterator[Stage]:
         """The rig, its camera also shown to whoever looks."""
         name = experiment.folder.name
-        if experiment.settings.rig.camera.kind == "simulated":
+        if experiment.settings.rig.camera_kind == "simulated":
             stage = open_stage(experiment, plan.board)
             self._live.open(name, lambda: stage.camera, "practice")
             with self._live.using():

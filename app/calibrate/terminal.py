@@ -118,7 +118,7 @@ def _screen(experiment: Experiment, options: LiveOptions, step: StepName) -> Ite
     """The real projector's screen, where the step needs one and the rig has it."""
     from app.rig.open import panel_of
 
-    simulated = experiment.settings.rig.camera.kind == "simulated"
+    simulated = experiment.settings.rig.camera_kind == "simulated"
     if simulated or panel_of(experiment.settings.scene) is None:
         yield None
         return

@@ -41,7 +41,7 @@ def acquire(
             rig_on_s=seconds_on(experiment.settings, told),
         )
         burst = judged(experiment, burst, told)
-        origin = {"rig": experiment.settings.rig.camera.kind, "air": state} | noted(experiment, told)
+        origin = {"rig": experiment.settings.rig.camera_kind, "air": state} | noted(experiment, told)
         recorder.keep(burst, origin=origin)
     if burst.outcome is not BurstOutcome.COMPLETE:
         raise AirlensError(

@@ -50,7 +50,7 @@ def take(
         recorder.discard()
         return TakenBurst(burst, None)
     burst = judged(experiment, burst, told)
-    origin = {"rig": experiment.settings.rig.camera.kind} | noted(experiment, told)
+    origin = {"rig": experiment.settings.rig.camera_kind} | noted(experiment, told)
     origin |= {"sequence": asdict(start)} if start else {}
     return TakenBurst(burst, recorder.keep(burst, origin))
 

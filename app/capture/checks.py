@@ -9,11 +9,10 @@ from datetime import UTC, datetime
 from typing import Any
 
 from app.errors import AirlensError
-from app.experiment.captures import load_capture
-from app.experiment.folder import Experiment, read_manifest
+from app.experiment.calibration import read_bundle
+from app.experiment.captures import CapturePair, load_capture
+from app.experiment.folder import Experiment
 from app.rig.conditions import UNTOLD, Conditions, conditions_of
-from calibration.bundle import from_json
-from calibration.errors import CalibrationError
 from calibration.handover import warnings_for
 from drivers.burst import Burst
 from drivers.quick_look import quick_look
@@ -42,22 +41,23 @@ def noted(experiment: Experiment, told: Conditions) -> dict[str, Any]:
 def calibration_warnings(experiment: Experiment, captured: str, told: Conditions) -> tuple[str, ...]:
     """Why a capture of that moment may not fit the calibration; nothing where there is none yet."""
     try:
-        bundle = from_json(experiment.bundle_path.read_text(encoding="utf-8"))
-    except (OSError, CalibrationError, UnicodeDecodeError):
+        bundle = read_bundle(experiment.folder)
+    except AirlensError as error:
+        return (str(error),)
+    if bundle is None:
         return ()
     known = conditions_of(experiment.settings, told)
     return warnings_for(bundle, captured, known.ambient_temperature_k, known.minutes_on)
 
 
-def aged(experiment: Experiment) -> tuple[str, ...]:
-    """Why the newest captures may not fit the calibration, by what their manifests noted."""
+def aged(experiment: Experiment, captures: CapturePair) -> tuple[str, ...]:
+    """Why these captures may not fit the calibration, by what their manifests noted."""
     found: dict[str, None] = {}
-    for role in ("reference", "flow"):
-        manifest = read_manifest(experiment.latest_capture(role))
-        origin = manifest.get("origin", {})
+    for capture in (captures.reference, captures.flow):
+        origin = capture.manifest.get("origin", {})
         told = Conditions(origin.get("ambient_temperature_k"), origin.get("minutes_on"))
-        for text in calibration_warnings(experiment, manifest["created"], told):
-            found[f"The {role} capture: {text}"] = None
+        for text in calibration_warnings(experiment, capture.manifest["created"], told):
+            found[f"The {capture.role} capture: {text}"] = None
     return tuple(found)
 
 

@@ -35,7 +35,7 @@ def check_projector(experiment: Experiment, screen: str, port: int, say: Callabl
 
 @contextlib.contextmanager
 def _stage(experiment: Experiment, screen: str, port: int, say: Callable[[str], object]) -> Iterator[Stage]:
-    if experiment.settings.rig.camera.kind == "simulated":
+    if experiment.settings.rig.camera_kind == "simulated":
         yield open_stage(experiment, None)
         return
     with open_screen(screen, port, say) as display:

@@ -122,7 +122,7 @@ class CaptureDesk:
         """Open the rig's camera unless it is; a simulated room is told what its air does."""
         source = experiment.folder.name
         open_for = (self._live.status.experiment, self._live.air)
-        simulated = experiment.settings.rig.camera.kind == "simulated"
+        simulated = experiment.settings.rig.camera_kind == "simulated"
         if self._live.status.state.value != "ready" or open_for != (
             source,
             air if simulated else self._live.air,

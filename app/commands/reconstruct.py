@@ -46,7 +46,7 @@ def reconstruct(
         done = run(experiment, preset, on_stage=stage, on_event=event)
     summary = {
         "result": str(done.folder / "result.nc"),
-        "report": str(done.folder / "report.html"),
+        "report": done.no_report or str(done.folder / "report.html"),
         "outcome": done.solution.outcome.name,
         "advice": done.solution.outcome.value,
         "solver_s": done.solution.solver_s,

@@ -19,9 +19,9 @@ def report(
     result: Result = None,
 ) -> None:
     """Write the report of a result: one HTML file that needs no network."""
-    from app.report.page import write_report
+    from app.report.page import report_again
 
-    typer.echo(str(write_report(experiment, result)))
+    typer.echo(str(report_again(experiment, result)))
 
 
 def export(

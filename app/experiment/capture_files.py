@@ -4,6 +4,7 @@ Fiji, ParaView, Python and MATLAB open both unaided. The raw stack is flushed pa
 every page that was written can be read, which a plain HDF5 file does not offer.
 """
 
+import io
 import json
 import os
 import struct
@@ -51,8 +52,13 @@ def write_image(path: Path, image: BurstImage) -> None:
 
 def read_image(path: Path) -> BurstImage:
     """Read what `write_image` wrote. Raises BadInputError when it is something else."""
+    return decode_image(path.read_bytes(), path)
+
+
+def decode_image(content: bytes, path: Path) -> BurstImage:
+    """The image in the bytes of a file; `path` names it in messages. Raises BadInputError."""
     try:
-        with tifffile.TiffFile(path) as file:
+        with tifffile.TiffFile(io.BytesIO(content)) as file:
             mean, std = (page.asarray() for page in file.pages)
             about: dict[str, Any] = json.loads(file.pages.first.description)
         return BurstImage(mean, std, int(about["frames"]))

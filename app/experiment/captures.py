@@ -10,11 +10,12 @@
 A folder without a manifest is an interrupted capture: what it holds can be read, and is never a measurement.
 """
 
+import hashlib
 import os
 import shutil
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -22,8 +23,8 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from app.errors import BadInputError
-from app.experiment.capture_files import BurstImage, RawStack, read_image, write_image
-from app.experiment.folder import read_manifest, write_manifest
+from app.experiment.capture_files import BurstImage, RawStack, decode_image, read_image, write_image
+from app.experiment.folder import Experiment, parse_manifest, write_manifest
 from app.files.durable import make_folder, sync, write_json
 from app.files.provenance import sha256
 from app.files.toml import to_plain
@@ -35,13 +36,45 @@ CHECKPOINT_S = 5.0
 
 @dataclass(frozen=True)
 class Capture:
-    """A capture as read back. `images` holds one image a view; `manifest` is empty for an interrupted one."""
+    """A capture as read back. `images` holds one image a view; `manifest` is empty for an interrupted one.
+
+    `sha256` has the hash of every file as it was read, by name.
+    """
 
     folder: Path
     role: str
     complete: bool
     images: tuple[BurstImage, ...]
     manifest: Mapping[str, Any]
+    sha256: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CapturePair:
+    """The two captures that a measurement compares."""
+
+    reference: Capture
+    flow: Capture
+
+    @property
+    def inputs(self) -> dict[str, dict[str, str]]:
+        """Every file that was read, with its capture and its hash, as a result's manifest names them."""
+        return {
+            f"{capture.role}/{name}": {
+                "capture": capture.folder.name,
+                "file": name,
+                "sha256": digest,
+            }
+            for capture in (self.reference, self.flow)
+            for name, digest in capture.sha256.items()
+        }
+
+
+def newest_pair(experiment: Experiment) -> CapturePair:
+    """The newest finished reference and flow. Raises BadInputError when one is missing or not as it was kept."""
+    return CapturePair(
+        load_capture(experiment.latest_capture("reference")), load_capture(experiment.latest_capture("flow"))
+    )
 
 
 def write_capture(
@@ -92,11 +125,17 @@ def describe_burst(burst: Burst) -> dict[str, Any]:
 
 
 def load_capture(folder: Path) -> Capture:
-    """Read a capture, finished or interrupted. Raises BadInputError when there is nothing to read."""
-    if (folder / "manifest.json").exists():
-        manifest = read_manifest(folder)
-        images = tuple(read_image(folder / view["file"]) for view in manifest["views"])
-        return Capture(folder, manifest["role"], manifest["complete"], images, manifest)
+    """Read a capture, finished or interrupted.
+
+    Raises BadInputError when there is nothing to read, or when a file is not the one that was kept.
+    """
+    path = folder / "manifest.json"
+    if path.exists():
+        text = path.read_bytes()
+        manifest = parse_manifest(text, path)
+        read = {path.name: hashlib.sha256(text).hexdigest()}
+        images = tuple(_kept_image(folder, view, read) for view in manifest["views"])
+        return Capture(folder, manifest["role"], manifest["complete"], images, manifest, read)
     partial = folder / "partial.tif"
     if not partial.exists():
         raise BadInputError(
@@ -104,6 +143,25 @@ def load_capture(folder: Path) -> Capture:
             "The burst was interrupted before its first frames; take it again."
         )
     return Capture(folder, "interrupted", False, (read_image(partial),), {})
+
+
+def _kept_image(folder: Path, view: Mapping[str, Any], read: dict[str, str]) -> BurstImage:
+    """One view's image, read once; its hash is held against the manifest's and noted in `read`."""
+    path = folder / view["file"]
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BadInputError(
+            f"{path} cannot be read ({error.strerror}); restore it from a copy, or take the capture again."
+        ) from None
+    found, kept = hashlib.sha256(content).hexdigest(), view.get("sha256")
+    if found != kept:
+        raise BadInputError(
+            f"{path} is not the file that was kept: its SHA-256 is {found}, and {folder / 'manifest.json'} says "
+            f"{kept}. Restore the file from a copy, or take the capture again."
+        )
+    read[path.name] = found
+    return decode_image(content, path)
 
 
 class CaptureRecorder:

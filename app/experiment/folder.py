@@ -67,20 +67,14 @@ class Experiment:
             )
         return path
 
-    def captures(self, role: str | None = None) -> list[Path]:
-        """Finished captures of a role ('reference', 'flow'), oldest first."""
-        folders = finished(self.captures_folder)
-        return [f for f in folders if role is None or read_manifest(f).get("role") == role]
-
     def latest_capture(self, role: str) -> Path:
         """The newest finished capture of a role. Raises BadInputError when there is none."""
-        found = self.captures(role)
-        if not found:
-            raise BadInputError(
-                f"{self.folder} has no finished {role} capture. "
-                f"Take one: airlens capture {role} {self.folder}"
-            )
-        return found[-1]
+        for folder in reversed(finished(self.captures_folder)):
+            if read_manifest(folder).get("role") == role:
+                return folder
+        raise BadInputError(
+            f"{self.folder} has no finished {role} capture. Take one: airlens capture {role} {self.folder}"
+        )
 
     def latest_result(self) -> Path:
         """The newest finished result. Raises BadInputError when there is none."""
@@ -137,8 +131,19 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """The manifest of a finished capture or result. Raises BadInputError when it is not JSON."""
     path = folder / "manifest.json"
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        text = path.read_bytes()
+    except OSError as error:
+        raise BadInputError(
+            f"{path} cannot be read ({error}); remove the folder, or restore it from a copy."
+        ) from None
+    return parse_manifest(text, path)
+
+
+def parse_manifest(text: bytes, path: Path) -> dict[str, Any]:
+    """The manifest in the bytes of `path`. Raises BadInputError when they are not JSON."""
+    try:
+        return json.loads(text)
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
         raise BadInputError(
             f"{path} cannot be read ({error}); remove the folder, or restore it from a copy."
         ) from None

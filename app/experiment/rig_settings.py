@@ -68,8 +68,13 @@ class ProjectorSettings(Strict):
 
 
 class RigSettings(Strict):
-    """The devices of the rig, and the board that it is calibrated with."""
+    """The devices of the rig, and the board that it is calibrated with. No device stands in for one not named."""
 
-    camera: CameraSettings = SimulatedCameraSettings()
+    camera: CameraSettings | None = None
     projector: ProjectorSettings | None = None
     board: BoardSettings | None = None
+
+    @property
+    def camera_kind(self) -> str:
+        """The kind of camera that is named; `none` where none is."""
+        return "none" if self.camera is None else self.camera.kind

@@ -1,4 +1,4 @@
-"""What a file or a result came from: hashes, versions, device."""
+"""What a file or a result came from: its hash, versions, device."""
 
 import hashlib
 import importlib.metadata
@@ -16,13 +16,12 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def provenance(inputs: dict[str, Path]) -> dict[str, Any]:
-    """Date, hashes of the input files, package versions, and the machine's device."""
+def provenance() -> dict[str, Any]:
+    """Date, package versions, and the machine's device."""
     import jax
 
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "inputs": {name: {"file": path.name, "sha256": sha256(path)} for name, path in inputs.items()},
         "versions": {"python": platform.python_version()}
         | {name: importlib.metadata.version(name) for name in _PACKAGES},
         "device": str(jax.devices()[0]),

@@ -1,20 +1,18 @@
 """`plan`: what this experiment would see and cost, before anybody measures. Kept as plan.json beside it."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from app.experiment.boundary import read_planes, read_sensors
 from app.experiment.folder import Experiment, open_experiment
 from app.experiment.plan import PLAN_FILE, ChoiceLine, MapLine, Plan, PresetLine, SeenLine, ViewLine
 from app.files.durable import write_json
 from app.files.toml import to_plain
 from app.plan.machine import this_machine
 from app.plan.tradeoff import ExpectedError, expected_error
-from app.reconstruct.measure import Measurement, with_calibration
 from app.reconstruct.presets import REFERENCE, STANDARD
+from app.reconstruct.problem import known_of
 from core.displacement import resolve_window_px
 from core.known import level_of
 from core.metrics import departure, inner, rms
@@ -22,7 +20,6 @@ from core.plan.choice import Choice
 from core.plan.choices import Resolution, resolve
 from core.plan.cost import Speed, Work, draft_work, grid_work, paper_work, room_work
 from core.plan.expected import ExpectedFlow, expected_flow
-from core.plan.measured import resolve_measured
 from core.plan.observability import seen
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import Signal, other_light, shift_map, signal
@@ -79,26 +76,13 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
 
 def stated_problem(experiment: Experiment) -> Problem:
     """The problem without its measurements: scene, planes, sensors."""
-    scene, _ = with_calibration(experiment.settings.scene, experiment.bundle_path)
-    return Problem(scene, (), read_planes(experiment, scene), read_sensors(experiment, scene))
+    known = known_of(experiment)
+    return Problem(known.scene, (), known.planes, known.sensors)
 
 
 def departure_k(flow: ExpectedFlow) -> float:
     """Rms departure of the expected temperature from the mean at each height, as the score takes it."""
     return rms(departure(inner(flow.excess_k)))
-
-
-def settled(measurement: Measurement, preset: str) -> tuple[Problem, list[ChoiceLine]]:
-    """The measured problem with its `auto` values settled, and the choices as they are told.
-
-    The grid's is the draft's: other presets have levels of their own.
-    """
-    problem = measurement.problem
-    resolution = resolve_measured(problem, measurement.references)
-    grid = resolution.scene.solve.grid if preset == "draft" else problem.scene.solve.grid
-    scene = replace(resolution.scene, solve=replace(problem.scene.solve, grid=grid))
-    made = Problem(scene, problem.shifts, problem.planes, problem.sensors, problem.images)
-    return made, choice_lines(resolution)
 
 
 def choice_lines(resolution: Resolution) -> list[ChoiceLine]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float32
 
+from app.experiment.captures import Capture
 from core.geometry import crop
 from core.render import render_reference
 from core.scene import Scene
@@ -12,14 +13,14 @@ from core.scene import Scene
 _CROP_PX = 256
 
 
-def rendered_agreement(scene: Scene, references: tuple[Float32[np.ndarray, "_ _"], ...]) -> str:
+def rendered_agreement(scene: Scene, reference: Capture) -> str:
     """A sentence: the correlation of rendered and captured reference in the middle of each view.
 
     Near 1 when geometry and pattern are right; near 0 when the wrong pattern is shown or the calibration
     is off by more than the finest feature. The reconstruction compares captures, so it does not depend
     on this; rays do.
     """
-    worst = min(_correlation(scene, view, image) for view, image in enumerate(references))
+    worst = min(_correlation(scene, view, image.mean) for view, image in enumerate(reference.images))
     verdict = (
         "the calibrated geometry holds"
         if worst > 0.5

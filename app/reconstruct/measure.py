@@ -1,20 +1,17 @@
-"""From captures to `core.problem.Problem`: shifts with their noise, drift taken out, planes and sensors."""
+"""From captures to shifts with their noise, the drift between the exposures taken out."""
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float32
 from scipy.ndimage import uniform_filter
 
 from app.errors import BadInputError
-from app.experiment.boundary import read_planes, read_sensors
-from app.experiment.captures import Capture, load_capture
-from app.experiment.folder import Experiment
+from app.experiment.captures import Capture, CapturePair
 from core.camera_noise import frame_variance
 from core.displacement import measure_shift, resolve_window_px, window_centres
 from core.drift import Similarity, fit_similarity, move_image, similarity_basis
-from core.problem import Problem, ShiftMeasurement
+from core.problem import ImagePair, ShiftMeasurement
 from core.rays.visibility import sees_wall
 from core.scene import Scene, View
 from core.window_fit import derivative_filter
@@ -28,19 +25,22 @@ _DRIFT_PASSES = 3
 
 @dataclass(frozen=True)
 class Measurement:
-    """The problem, and what the report shows beside it: images, drift of each view, how it was found."""
+    """What two captures say: the shift of every view, with the captures it was measured on.
 
-    problem: Problem
-    references: tuple[Image, ...]
-    flows: tuple[Image, ...]
+    `images` are what a data term of single pixels compares: the reference, moved by the drift, and the flow.
+    They are there only where the scene asks for such a term. `notes` tell how the drift was found.
+    """
+
+    captures: CapturePair
+    shifts: tuple[ShiftMeasurement, ...]
     drifts: tuple[Similarity, ...]
     notes: tuple[str, ...]
+    images: tuple[ImagePair, ...] = ()
 
 
-def measure(experiment: Experiment, scene: Scene) -> Measurement:
-    """Measure every view of the newest reference and flow captures. Raises BadInputError, SettingError."""
-    reference = load_capture(experiment.latest_capture("reference"))
-    flow = load_capture(experiment.latest_capture("flow"))
+def measure(captures: CapturePair, scene: Scene) -> Measurement:
+    """Measure every view of a reference and a flow. Raises BadInputError, SettingError."""
+    reference, flow = captures.reference, captures.flow
     _check_captures(reference, flow, scene)
     shifts, drifts, notes = [], [], []
     for index, view in enumerate(scene.views):
@@ -48,14 +48,17 @@ def measure(experiment: Experiment, scene: Scene) -> Measurement:
         shifts.append(shift)
         drifts.append(drift)
         notes.append(note)
-    problem = Problem(
-        scene=scene,
-        shifts=tuple(shifts),
-        planes=read_planes(experiment, scene),
-        sensors=read_sensors(experiment, scene),
-    )
-    images = [tuple(image.mean for image in capture.images) for capture in (reference, flow)]
-    return Measurement(problem, images[0], images[1], tuple(drifts), tuple(notes))
+    images: tuple[ImagePair, ...] = ()
+    if scene.solve.data_term == "warped":
+        images = tuple(_pair(view, n, captures, drifts[n]) for n, view in enumerate(scene.views))
+    return Measurement(captures, tuple(shifts), tuple(drifts), tuple(notes), images)
+
+
+def _pair(view: View, index: int, captures: CapturePair, drift: Similarity) -> ImagePair:
+    before, after = captures.reference.images[index], captures.flow.images[index]
+    variance = frame_variance(before.mean, view.noise) / before.frames
+    variance += frame_variance(after.mean, view.noise) / after.frames
+    return ImagePair(move_image(before.mean, drift), after.mean, float(variance.mean()))
 
 
 def _measure_view(
@@ -143,23 +146,3 @@ def _check_captures(reference: Capture, flow: Capture, scene: Scene) -> None:
                     f"{capture.folder}: {100 * saturated:.1f} % of the {capture.role} image is saturated; "
                     "expected below 1 %. Shorten the exposure or dim the light, and capture both again."
                 )
-
-
-def with_calibration(scene: Scene, path: Path) -> tuple[Scene, str]:
-    """The scene with the calibrated optics and noise in place of the nominal ones, and a sentence on it."""
-    from calibration.bundle import from_json
-
-    if not path.exists():
-        return scene, "Not calibrated: the optics are those written in experiment.toml."
-    bundle = from_json(path.read_text(encoding="utf-8"), str(path))
-    views = []
-    for view in scene.views:
-        response = bundle.response(view.name)
-        noise = response.noise if response else view.noise
-        views.append(replace(view, camera=bundle.camera(view.name).optics, noise=noise))
-    light = scene.light
-    if bundle.projector is not None and light.kind == "projector":
-        light = replace(light, projector=bundle.projector.optics)
-    source = bundle.camera(scene.views[0].name).quality.source
-    sentence = f"Calibration of {bundle.date}, camera {source}."
-    return replace(scene, views=tuple(views), light=light), sentence

@@ -1,19 +1,20 @@
-"""`report`: one offline HTML file with the pictures that a person wants first."""
+"""`report`: one offline HTML file with the pictures that a person wants first.
 
+A result is worth more than its report: what cannot be drawn says why in its place, and the rest is there.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, select_autoescape
-from scipy.interpolate import RegularGridInterpolator
 
 from app.calibrate.folder import CalibrationFolder
 from app.calibrate.page import figures, measured_model
-from app.experiment.captures import load_capture
-from app.experiment.folder import Experiment, open_experiment, read_manifest
-from app.experiment.results import read_result
-from app.experiment.shift_files import read_shifts
+from app.errors import explained
+from app.experiment.folder import Experiment, open_experiment
 from app.files.durable import write_text
 from app.report.figures import (
     as_data_uri,
@@ -23,11 +24,13 @@ from app.report.figures import (
     slices_figure,
     volume_figure,
 )
-from app.volume.file import RoomVolume, read_volume
-from app.volume.score import score_solution
+from app.report.finding import Finding, read_finding
+from app.volume.score import truth_at
 from core.displacement import standard_deviation_px
 from core.problem import ShiftMeasurement
 from core.result import Solution
+
+Rows = Iterable[tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -40,175 +43,196 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and its pictures."""
+    """A heading with its pictures or its table, and why what is missing is missing."""
 
     title: str
-    figures: tuple[Picture, ...]
+    figures: tuple[Picture, ...] = ()
+    heads: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    missing: tuple[str, ...] = ()
 
 
-def write_report(folder: Path, result: Path | None = None) -> Path:
-    """Write report.html into the newest (or the given) result. Raises BadInputError."""
+def report_again(folder: Path, result: Path | None = None) -> Path:
+    """Write report.html into the newest (or the given) result of an experiment. Raises BadInputError."""
     experiment = open_experiment(folder)
     result_folder = result or experiment.latest_result()
-    path = result_folder / "report.html"
-    write_text(path, render_report(experiment, result_folder))
+    return write_report(read_finding(experiment, result_folder), result_folder)
+
+
+def write_report(finding: Finding, folder: Path) -> Path:
+    """Write report.html into a result's folder. Raises OSError."""
+    path = folder / "report.html"
+    write_text(path, render_report(finding))
     return path
 
 
-def render_report(experiment: Experiment, result_folder: Path) -> str:
+def render_report(finding: Finding) -> str:
     """The page as text."""
-    solution = read_result(result_folder / "result.nc")
-    manifest = read_manifest(result_folder)
-    shifts = read_shifts(result_folder)
-    truth = _truth(experiment)
     environment = Environment(
         loader=PackageLoader("app.report"),
         autoescape=select_autoescape(),
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    experiment, manifest = finding.experiment, finding.manifest
     return environment.get_template("report.html").render(
         title=experiment.settings.title or experiment.folder.name,
         experiment=experiment.folder.name,
-        result=result_folder.name,
-        preset=manifest["preset"],
-        created=manifest["created"],
-        sentences=summary(solution, shifts, truth),
-        sections=_sections(experiment, manifest, solution, shifts, truth),
-        scores=_score_rows(score_solution(solution, truth)) if truth else [],
-        assumed=manifest["assumed"],
-        choices=_choices(manifest),
-        facts=_facts(experiment),
-        origin=_origin(manifest),
+        result=finding.name,
+        preset=manifest.get("preset", "unknown"),
+        created=manifest.get("created", "at an unknown time"),
+        sentences=summary(finding),
+        sections=_sections(finding),
     )
 
 
-def summary(
-    solution: Solution, shifts: tuple[ShiftMeasurement, ...], truth: RoomVolume | None
-) -> tuple[str, ...]:
+def summary(finding: Finding) -> tuple[str, ...]:
     """Three sentences: what was seen, what the air does, and how well that is known."""
-    size = np.linalg.norm(shifts[0].displacement_px, axis=1)
-    noise = float(np.median(standard_deviation_px(shifts[0])))
+    made = []
+    for say in (_seen, _air_in_words, _known_in_words):
+        try:
+            made.append(say(finding))
+        except Exception as error:  # a result without one of its sentences is still a result
+            made.append(f"Not told: {explained(error)}")
+    return tuple(made)
+
+
+def _seen(finding: Finding) -> str:
+    shift: ShiftMeasurement = finding.shifts()[0]
+    size = np.linalg.norm(shift.displacement_px, axis=1)
+    noise = float(np.median(standard_deviation_px(shift)))
     ratio = float(np.median(size)) / noise
-    seen = (
+    return (
         f"The pattern moved by {1e3 * np.median(size):.2f} thousandths of a pixel in the median "
         f"({1e3 * np.percentile(size, 99):.2f} at the 99th percentile), {ratio:.1f} times the noise of a window."
     )
-    t = solution.temperature_k
-    air = (
+
+
+def _air_in_words(finding: Finding) -> str:
+    t = finding.solution.temperature_k
+    return (
         f"The air runs from {np.percentile(t, 1):.2f} to {np.percentile(t, 99):.2f} K "
         f"(1st to 99th percentile), {t.mean(axis=(0, 1))[-1] - t.mean(axis=(0, 1))[0]:+.2f} K from floor to ceiling."
     )
-    if truth is None:
-        return (
-            seen,
-            air,
-            "There is no truth to compare with; the assumptions below say what was taken on trust.",
-        )
-    score = score_solution(solution, truth)["T"]
+
+
+def _known_in_words(finding: Finding) -> str:
+    if finding.scores is None:
+        return "There is no truth to compare with; the assumptions below say what was taken on trust."
+    score = finding.scores["T"]
     trivial = score["trivial"]
-    known = (
+    return (
         f"Against the truth the temperature is off by {score['rms_K']:.3f} K (rms); the inlet wall's plane "
         f"carried through the room would be off by {trivial['inlet_plane']:.3f} K, ambient by "
         f"{trivial['ambient']:.2f} K, and the truth's own mean along the view by {trivial['y_mean']:.3f} K."
     )
-    return seen, air, known
 
 
-def _sections(
-    experiment: Experiment,
-    manifest: dict[str, Any],
-    solution: Solution,
-    shifts: tuple[ShiftMeasurement, ...],
-    truth: RoomVolume | None,
-) -> list[Section]:
-    captures = [
-        load_capture(experiment.captures_folder / manifest["captures"][role])
-        for role in ("reference", "flow")
+def _sections(finding: Finding) -> list[Section]:
+    manifest = finding.manifest
+    made = [
+        _drawn("What the camera saw", lambda: _images(finding)),
+        _drawn("How far the pattern moved", lambda: _shifts(finding)),
+        _drawn("The air", lambda: _air(finding), lambda: _known(finding.solution), lambda: _errors(finding)),
+        *(
+            _drawn(f"Calibration: {view.name}", lambda name=view.name: _calibration(finding.experiment, name))
+            for view in finding.experiment.settings.scene.views
+        ),
+        _listed(
+            "Against the truth", lambda: _score_rows(finding), heads=("quantity", "error", "trivial answers")
+        ),
+        _listed("What was assumed", lambda: ((sentence,) for sentence in manifest["assumed"])),
+        _listed("What was known, and of what", lambda: _facts(finding.experiment)),
+        _listed("Where this came from", lambda: _origin(manifest)),
     ]
-    seen = [
-        Picture(
-            as_data_uri(images_figure(captures[0].images[i].mean, captures[1].images[i].mean)),
+    return [section for section in made if section.figures or section.rows or section.missing]
+
+
+def _drawn(title: str, *parts: Callable[[], Iterable[Picture]]) -> Section:
+    """The pictures of a section; a part that fails says why, and the others are drawn."""
+    pictures: list[Picture] = []
+    missing: list[str] = []
+    for part in parts:
+        try:
+            pictures += part()
+        except Exception as error:  # no picture may cost a result
+            missing.append(f"Not drawn: {explained(error)}")
+    return Section(title, figures=tuple(pictures), missing=tuple(missing))
+
+
+def _listed(title: str, make: Callable[[], Rows], heads: tuple[str, ...] = ()) -> Section:
+    """The table of a section, or why there is none."""
+    try:
+        return Section(title, heads=heads, rows=tuple(make()))
+    except Exception as error:  # no table may cost a result
+        return Section(title, missing=(f"Not listed: {explained(error)}",))
+
+
+def _images(finding: Finding) -> Iterable[Picture]:
+    pair = finding.captures()
+    for before, after, view in zip(
+        pair.reference.images, pair.flow.images, finding.experiment.settings.scene.views, strict=True
+    ):
+        yield Picture(
+            as_data_uri(images_figure(before.mean, after.mean)),
             f"{view.name}: mean images, drawn at reduced size. The shift is too small to be seen in them.",
         )
-        for i, view in enumerate(experiment.settings.scene.views)
-    ]
-    moved = [
-        Picture(as_data_uri(shift_figure(shift)), f"Measured shift, windows of {shift.window_px} px.")
-        for shift in shifts
-    ]
-    ambient = experiment.settings.scene.air.ambient_temperature_k
-    arrows = ", arrows: velocity" if solution.velocity_m_s is not None else ""
-    air = [
-        Picture(
-            as_data_uri(slices_figure(solution, ambient)),
-            f"Temperature above ambient ({ambient:.2f} K) on the middle planes{arrows}.",
-        )
-    ]
-    air += _known(solution)
-    if truth is not None:
-        error = solution.temperature_k - _truth_at(truth, solution)
-        air.append(
-            Picture(
-                as_data_uri(error_figure(solution, error)), "Temperature minus truth, on the same planes."
-            )
-        )
-    return [
-        Section("What the camera saw", tuple(seen)),
-        Section("How far the pattern moved", tuple(moved)),
-        Section("The air", tuple(air)),
-        *_calibration(experiment),
-    ]
 
 
-def _known(solution: Solution) -> list[Picture]:
+def _shifts(finding: Finding) -> Iterable[Picture]:
+    for shift in finding.shifts():
+        yield Picture(as_data_uri(shift_figure(shift)), f"Measured shift, windows of {shift.window_px} px.")
+
+
+def _air(finding: Finding) -> Iterable[Picture]:
+    ambient = finding.experiment.settings.scene.air.ambient_temperature_k
+    arrows = ", arrows: velocity" if finding.solution.velocity_m_s is not None else ""
+    yield Picture(
+        as_data_uri(slices_figure(finding.solution, ambient)),
+        f"Temperature above ambient ({ambient:.2f} K) on the middle planes{arrows}.",
+    )
+
+
+def _known(solution: Solution) -> Iterable[Picture]:
     """How sure the solver is, and where the measurements rather than the model speak."""
-    pictures = []
     if solution.temperature_std_k is not None:
         figure = volume_figure(solution, solution.temperature_std_k, "one sigma of T [K]")
-        pictures.append(Picture(as_data_uri(figure), "Standard deviation of the temperature."))
+        yield Picture(as_data_uri(figure), "Standard deviation of the temperature.")
     if solution.velocity_std_m_s is not None:
         size = np.linalg.norm(solution.velocity_std_m_s, axis=-1)
         figure = volume_figure(solution, size, "one sigma of u [m/s]")
-        pictures.append(Picture(as_data_uri(figure), "Standard deviation of the velocity."))
+        yield Picture(as_data_uri(figure), "Standard deviation of the velocity.")
     if solution.informed is not None:
         figure = volume_figure(solution, solution.informed, "informed [1]", highest=1.0)
-        pictures.append(
-            Picture(
-                as_data_uri(figure),
-                "Share of the temperature's prior variance that the measurements removed: at 0 the model "
-                "speaks alone.",
-            )
+        yield Picture(
+            as_data_uri(figure),
+            "Share of the temperature's prior variance that the measurements removed: at 0 the model "
+            "speaks alone.",
         )
-    return pictures
 
 
-def _calibration(experiment: Experiment) -> list[Section]:
-    """Residuals, coverage and the rig of each camera that was measured; nothing for a given one."""
+def _errors(finding: Finding) -> Iterable[Picture]:
+    if finding.truth is not None:
+        solution = finding.solution
+        error = solution.temperature_k - truth_at(finding.truth, solution, finding.truth.temperature_k)
+        yield Picture(
+            as_data_uri(error_figure(solution, error)), "Temperature minus truth, on the same planes."
+        )
+
+
+def _calibration(experiment: Experiment, camera: str) -> Iterable[Picture]:
+    """Residuals, coverage and the rig of a camera that was measured; nothing for a given one."""
     folder = CalibrationFolder(experiment.folder)
-    found = []
-    for view in experiment.settings.scene.views:
-        model = measured_model(folder, view.name)
-        if model is not None:
-            pictures = (Picture(as_data_uri(f), title) for title, f in figures(model, folder.bundle()))
-            found.append(Section(f"Calibration: {view.name}", tuple(pictures)))
-    return found
+    model = measured_model(folder, camera)
+    if model is not None:
+        for title, figure in figures(model, folder.bundle()):
+            yield Picture(as_data_uri(figure), title)
 
 
-def _truth(experiment: Experiment) -> RoomVolume | None:
-    path = experiment.folder / "truth.npz"
-    return read_volume(path) if path.exists() else None
-
-
-def _truth_at(truth: RoomVolume, solution: Solution) -> np.ndarray:
-    axes = (truth.x_m, truth.y_m, truth.z_m)
-    own = (solution.x_m, solution.y_m, solution.z_m)
-    clipped = [np.clip(mine, axis[0], axis[-1]) for mine, axis in zip(own, axes, strict=True)]
-    mesh = np.stack(np.meshgrid(*clipped, indexing="ij"), axis=-1)
-    return RegularGridInterpolator(axes, truth.temperature_k.astype(np.float64))(mesh)
-
-
-def _score_rows(scores: dict[str, Any]) -> list[tuple[str, str, str]]:
+def _score_rows(finding: Finding) -> list[tuple[str, ...]]:
+    scores = finding.scores
+    if scores is None:
+        return []
     t = scores["T"]
     trivial = t["trivial"]
     rows = [
@@ -268,17 +292,7 @@ def _describe(known: Any) -> str:
     return ", ".join(parts)
 
 
-def _choices(manifest: dict[str, Any]) -> list[tuple[str, str, str, str, str]]:
-    """What auto resolved to: name, value, bound against limit, cost, reason; none in results of old."""
-    rows = []
-    for choice in manifest.get("choices", []):
-        held = f"{choice['bound']:.1g} of {choice['limit']:.1g} {choice['unit']}" if choice["limit"] else "-"
-        cost = f"{100 * choice['cost_share']:.0f} %" if choice["cost_share"] >= 0.005 else "below 1 %"
-        rows.append((choice["name"], str(choice["value"]), held, cost, choice["reason"]))
-    return rows
-
-
-def _origin(manifest: dict[str, Any]) -> list[tuple[str, str]]:
+def _origin(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows = [
         ("outcome", f"{manifest['outcome']}: {manifest['advice']}"),
         (
@@ -288,6 +302,7 @@ def _origin(manifest: dict[str, Any]) -> list[tuple[str, str]]:
         ("versions", ", ".join(f"{name} {version}" for name, version in manifest["versions"].items())),
     ]
     rows += [
-        (name, f"{entry['file']}, sha256 {entry['sha256']}") for name, entry in manifest["inputs"].items()
+        (name, f"{entry.get('capture', '')} {entry['file']}, sha256 {entry['sha256']}".strip())
+        for name, entry in manifest["inputs"].items()
     ]
     return rows

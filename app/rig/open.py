@@ -10,7 +10,7 @@ from jaxtyping import Float32
 
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
-from app.experiment.rig_settings import SimulatedCameraSettings
+from app.experiment.rig_settings import CameraSettings, SimulatedCameraSettings
 from app.rig.cameras import open_v4l2
 from app.rig.practice_room import PracticeRoom
 from app.rig.projectors import open_real_projector
@@ -33,6 +33,7 @@ from drivers.simulated.projector.engine import SimulatedProjector
 from drivers.simulated.projector.escvp21 import EscVp21Twin
 from drivers.simulated.projector.hosts import LoopPort
 from drivers.simulated.projector.state import ProjectorState
+from drivers.v4l2 import list_devices
 
 AirState = Literal["still", "moving"]
 
@@ -42,10 +43,23 @@ FRAME_SEED = 1_000_003
 
 def open_camera(experiment: Experiment, air: AirState, view: int = 0) -> Camera:
     """Open the experiment's camera. `air` says what a simulated room does; a real room is as it is."""
-    settings = experiment.settings.rig.camera
+    settings = named_camera(experiment)
     if isinstance(settings, SimulatedCameraSettings):
         return _simulated_camera(experiment, settings, air, view)
     return open_v4l2(settings)
+
+
+def named_camera(experiment: Experiment) -> CameraSettings:
+    """The camera that the experiment names. Raises BadInputError, with the cameras found, where it names none."""
+    settings = experiment.settings.rig.camera
+    if settings is not None:
+        return settings
+    found = ", ".join(f"{device.path} ({device.name})" for device in list_devices()) or "none"
+    raise BadInputError(
+        f"The rig of {experiment.folder.name} names no camera. Cameras found on this machine: {found}. Add to its "
+        'experiment.toml: [rig.camera] with kind = "v4l2", device, width_px, height_px and exposure_s; '
+        'or with kind = "simulated" for a rig that is computed.'
+    )
 
 
 def open_projector(experiment: Experiment) -> Projector:
@@ -76,7 +90,7 @@ def open_stage(
     experiment: Experiment, board: Board | None, display: PatternDisplay | None = None, view: int = 0
 ) -> Stage:
     """Open the experiment's rig for calibration; a real projector's screen is given as `display`."""
-    settings, scene = experiment.settings.rig.camera, experiment.settings.scene
+    settings, scene = named_camera(experiment), experiment.settings.scene
     if isinstance(settings, SimulatedCameraSettings):
         return PracticeStage(scene, settings, board, view)
     return RealStage(open_v4l2(settings), display, panel_of(scene))

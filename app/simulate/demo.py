@@ -9,8 +9,7 @@ from app.errors import BadInputError
 from app.experiment.rig_settings import SimulatedCameraSettings
 from app.pipeline import reconstruct
 from app.report.page import summary
-from app.simulate.experiment import TRUTH_FILE, simulate
-from app.volume.file import read_volume
+from app.simulate.experiment import simulate
 from app.volume.scene import RigOptions
 
 _MARK = ".airlens-demo"
@@ -44,6 +43,4 @@ def run_demo(
     )
     (folder / _MARK).touch()
     done = reconstruct(folder, "draft", on_stage=on_stage)
-    truth = read_volume(folder / TRUTH_FILE)
-    sentences = summary(done.solution, done.measurement.problem.shifts, truth)
-    return Story(sentences, done.folder / "report.html")
+    return Story(summary(done.finding), done.folder / "report.html")

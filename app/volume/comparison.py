@@ -11,8 +11,8 @@ from scipy.interpolate import RegularGridInterpolator
 from app.experiment.boundary import read_sensors
 from app.experiment.folder import Experiment
 from app.experiment.rig_settings import SimulatedCameraSettings
-from app.volume.file import Beside, RoomVolume, read_volume
-from app.volume.score import score_solution
+from app.volume.file import Beside, read_volume
+from app.volume.score import score_solution, truth_at
 from core.result import Solution
 
 
@@ -40,14 +40,16 @@ def truth_file(experiment: Experiment) -> Path | None:
 def beside_truth(solution: Solution, path: Path) -> list[Beside]:
     """Every solved quantity beside the truth in `path`; p about its own mean, since its level is free."""
     truth = read_volume(path)
-    found = [("T", "K", "temperature", solution.temperature_k, _at(solution, truth, truth.temperature_k))]
+    found = [
+        ("T", "K", "temperature", solution.temperature_k, truth_at(truth, solution, truth.temperature_k))
+    ]
     for index, axis in enumerate("xyz"):
         if solution.velocity_m_s is not None:
-            values = _at(solution, truth, truth.velocity_m_s[..., index])
+            values = truth_at(truth, solution, truth.velocity_m_s[..., index])
             own = solution.velocity_m_s[..., index]
             found.append(("uvw"[index], "m s-1", f"velocity along {axis}", own, values))
     if solution.pressure_m2_s2 is not None:
-        values = _at(solution, truth, truth.pressure_m2_s2)
+        values = truth_at(truth, solution, truth.pressure_m2_s2)
         own = solution.pressure_m2_s2
         level = own.mean() - values.mean()
         found.append(("p", "m2 s-2", "kinematic pressure", own, values + level))
@@ -82,16 +84,3 @@ def readings(experiment: Experiment, solution: Solution) -> list[Reading]:
 def _triple(place: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
     x, y, z = map(float, place)
     return x, y, z
-
-
-def _at(
-    solution: Solution, truth: RoomVolume, values: Float[np.ndarray, "tx ty tz"]
-) -> Float[np.ndarray, "nx ny nz"]:
-    """The truth at the result's vertices; the nearest wall outside its box."""
-    axes = (truth.x_m, truth.y_m, truth.z_m)
-    points = [
-        np.clip(own, axis[0], axis[-1])
-        for own, axis in zip((solution.x_m, solution.y_m, solution.z_m), axes, strict=True)
-    ]
-    mesh = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1)
-    return RegularGridInterpolator(axes, np.asarray(values, np.float64))(mesh)

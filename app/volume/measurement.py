@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import ndimage
 
+from app.reconstruct.problem import Known, problem_of
 from app.volume.file import RoomVolume
 from app.volume.scene import Information, RigOptions, room_scene
 from core.fields import GridField
@@ -37,7 +38,12 @@ def synthetic_problem(
 ) -> Problem:
     """What this rig measures of this room, and what an operator with this information knows."""
     scene = room_scene(volume, options, information)
-    return Problem(scene, (_measure(volume, scene, window_px, seed),), known_planes(volume, scene))
+    return problem_of(known_of_volume(volume, scene), (_measure(volume, scene, window_px, seed),))
+
+
+def known_of_volume(volume: RoomVolume, scene: Scene) -> Known:
+    """What an operator who states this scene knows of the room besides its pictures."""
+    return Known(scene, known_planes(volume, scene))
 
 
 def known_planes(volume: RoomVolume, scene: Scene) -> tuple[PlaneData, ...]:

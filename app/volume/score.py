@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from scipy.interpolate import RegularGridInterpolator
 
 from app.experiment.folder import open_experiment, read_manifest
@@ -59,6 +60,19 @@ def values_at(truth: RoomVolume, solution: Solution, values: np.ndarray) -> np.n
     points = [
         np.clip(axis, own[0], own[-1])
         for axis, own in zip((truth.x_m, truth.y_m, truth.z_m), axes, strict=True)
+    ]
+    mesh = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1)
+    return RegularGridInterpolator(axes, np.asarray(values, np.float64))(mesh)
+
+
+def truth_at(
+    truth: RoomVolume, solution: Solution, values: Float[np.ndarray, "tx ty tz"]
+) -> Float[np.ndarray, "nx ny nz"]:
+    """The truth's values at the solution's vertices; the nearest wall outside the truth's box."""
+    axes = (truth.x_m, truth.y_m, truth.z_m)
+    points = [
+        np.clip(own, axis[0], axis[-1])
+        for own, axis in zip((solution.x_m, solution.y_m, solution.z_m), axes, strict=True)
     ]
     mesh = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1)
     return RegularGridInterpolator(axes, np.asarray(values, np.float64))(mesh)

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from app.bench.room_fit import coverage, problem_of
+from app.reconstruct.problem import with_scene
 from app.volume.score import score_solution
 from core.problem import Problem
 from core.scene import BoundaryInformation, Heater, Inlet, Outlet, Wall
@@ -77,7 +78,7 @@ def misread(problem: Problem, seed: int) -> Problem:
         return item
 
     scene = replace(problem.scene, boundary=tuple(read(item) for item in problem.scene.boundary))
-    return Problem(scene, problem.shifts, problem.planes, problem.sensors)
+    return with_scene(problem, scene)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from app.experiment.rig_settings import SimulatedCameraSettings
+from app.pipeline import reconstruct
 from app.simulate.experiment import simulate
 from app.volume.scene import RigOptions
 
@@ -19,3 +20,9 @@ def experiment(tmp_path_factory):
     return simulate(
         ROOM, folder, options, "surveyed", SimulatedCameraSettings(noise_free=True, drift_px=0.02)
     )
+
+
+@pytest.fixture(scope="session")
+def done(experiment):
+    """A draft of it, which every story may read."""
+    return reconstruct(experiment, "draft")

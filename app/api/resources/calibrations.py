@@ -36,7 +36,7 @@ def read_calibration(given: Given, experiment: Identifier) -> CalibrationResourc
 def calibrate(given: Given, experiment: Identifier, new: NewCalibration) -> CalibrationResource:
     """Calibrate a simulated rig, in one step."""
     found = given.folders.open(experiment)
-    if found.settings.rig.camera.kind != new.kind:
+    if found.settings.rig.camera_kind != new.kind:
         raise ApiError(
             "conflict", "This rig is real: its models come from images.", "Run `airlens calibrate` on it."
         )

@@ -55,7 +55,7 @@ def _line(experiment: Experiment) -> ExperimentLine:
         experiment=experiment.folder.name,
         title=settings.title,
         information=settings.information,
-        camera=settings.rig.camera.kind,
+        camera=settings.rig.camera_kind,
         projector=settings.rig.projector is not None,
         light="projector" if isinstance(settings.scene.light, ProjectedPattern) else "texture",
         calibrated=is_calibrated(parts),

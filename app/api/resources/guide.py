@@ -81,7 +81,7 @@ def _plan(experiment: Experiment, request: GuideRequest) -> LivePlan:
         _board(experiment, request),
         request.frames,
         request.response_frames,
-        0.0 if experiment.settings.rig.camera.kind == "simulated" else request.settle_s,
+        0.0 if experiment.settings.rig.camera_kind == "simulated" else request.settle_s,
         place,
     )
 

@@ -155,10 +155,11 @@ def read_export(given: Given, experiment: Identifier, result: Identifier, form: 
 
 @router.get("/presets")
 def list_presets() -> list[PresetResource]:
-    """List the ways to solve, the quickest first."""
-    from app.reconstruct.presets import PRESETS
+    """List the ways to solve: what serves where nobody chooses, then the quickest first."""
+    from app.reconstruct.presets import AUTO, PRESETS, resolved
 
-    return [PresetResource(preset=name, about=_first_line(solve)) for name, solve in PRESETS.items()]
+    ways = {AUTO: resolved, **PRESETS}
+    return [PresetResource(preset=name, about=_first_line(way)) for name, way in ways.items()]
 
 
 def _score_lines(scored: dict[str, Any]) -> list[ScoreResource]:

@@ -22,7 +22,7 @@ EXPERIMENT = True
 class ReconstructSettings(Strict):
     """What to solve with; the presets are listed by `airlens reconstruct --help`."""
 
-    preset: str = Field(default="draft", min_length=1, max_length=64, pattern="^[a-z0-9-]+$")
+    preset: str = Field(default="auto", min_length=1, max_length=64, pattern="^[a-z0-9-]+$")
 
 
 def read(settings: Mapping[str, Any]) -> ReconstructSettings:
@@ -33,7 +33,7 @@ def read(settings: Mapping[str, Any]) -> ReconstructSettings:
 def target(order: Mapping[str, Any], folder: Path) -> Path:
     """Return the place among the experiment's results: by the time of submission, so that names sort."""
     moment = datetime.fromtimestamp(order["submitted_s"], UTC).strftime("%Y%m%dT%H%M%S")
-    preset = order["settings"].get("preset", "draft")
+    preset = order["settings"].get("preset", "auto")
     return Path(order["experiment"]) / "results" / f"{moment}-{preset}-{folder.name}"
 
 
@@ -70,6 +70,7 @@ def run(attempt: Attempt, settings: ReconstructSettings) -> dict[str, Any]:
     if done.solution.outcome is Outcome.stopped:
         attempt.check_stop()
     warm_k = done.solution.temperature_k
-    ambient_k = done.measurement.problem.scene.air.ambient_temperature_k
+    ambient_k = done.problem.scene.air.ambient_temperature_k
     attempt.show((warm_k[:, warm_k.shape[1] // 2] - ambient_k).astype("float32"), last=True)
-    return {"preset": settings.preset, "outcome": done.solution.outcome.name}
+    ended = {"preset": done.finding.manifest["preset"], "outcome": done.solution.outcome.name}
+    return ended | ({"no_report": done.no_report} if done.no_report else {})

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from app.errors import AirlensError, BadInputError
-from app.experiment.capture_files import read_raw_stack
+from app.experiment.capture_files import BurstImage, read_image, read_raw_stack, write_image
 from app.experiment.captures import CaptureRecorder, load_capture, write_capture
 from app.files.disk_space import check_room
+from app.files.provenance import sha256
 from drivers.burst import CapturePlan
 from drivers.capture import run_capture
 from drivers.protocols import CameraInfo
@@ -142,4 +143,39 @@ def test_what_is_no_capture_is_refused_with_the_reason(tmp_path):
     folder = write_capture(tmp_path / "cut", burst)
     (folder / "reference.tif").write_bytes((folder / "reference.tif").read_bytes()[:5000])
     with pytest.raises(BadInputError, match=r"reference\.tif is not"):
+        load_capture(folder)
+    (folder / "reference.tif").unlink()
+    with pytest.raises(BadInputError, match=r"reference\.tif cannot be read .* take the capture again"):
+        load_capture(folder)
+
+
+def test_a_file_that_is_not_the_one_that_was_kept_is_refused_by_its_hash(tmp_path):
+    burst = run_capture(make_camera(), CapturePlan(frames=2))
+    folder = write_capture(tmp_path / "kept", burst)
+    kept = load_capture(folder)
+    for name, digest in kept.sha256.items():
+        assert digest == sha256(folder / name)
+    assert set(kept.sha256) == {"manifest.json", "reference.tif"}
+
+    # A picture that can be read, and is not the one that was measured.
+    image = read_image(folder / "reference.tif")
+    write_image(folder / "reference.tif", BurstImage(image.mean * np.float32(0.5), image.std, image.frames))
+    with pytest.raises(BadInputError, match=r"is not the file that was kept.*Restore the file"):
+        load_capture(folder)
+
+    other = write_capture(tmp_path / "other", burst)
+    manifest = json.loads((other / "manifest.json").read_text())
+    manifest["views"][0]["sha256"] = "x"
+    (other / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(BadInputError, match=r"reference\.tif is not the file that was kept.*says x\."):
+        load_capture(other)
+
+
+def test_a_file_with_its_hash_that_is_no_picture_is_refused(tmp_path):
+    folder = write_capture(tmp_path / "text", run_capture(make_camera(), CapturePlan(frames=2)))
+    (folder / "reference.tif").write_text("not a picture")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["views"][0]["sha256"] = sha256(folder / "reference.tif")
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(BadInputError, match=r"reference\.tif is not a capture's image"):
         load_capture(folder)

@@ -27,7 +27,7 @@ def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def begun(ledger: Ledger, experiment: Path) -> tuple[JobFolder, Owner]:
-    job = ledger.submit(JobSpec(kind="reconstruct", experiment=experiment))
+    job = ledger.submit(JobSpec(kind="reconstruct", experiment=experiment, settings={"preset": "draft"}))
     folder, owner = JobFolder(ledger.folder_of(job.id)), Owner(1, "first")
     folder.hand_over(owner)
     return folder, owner

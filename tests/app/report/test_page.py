@@ -1,0 +1,136 @@
+"""A result is worth more than its report: what cannot be drawn says why in its place, and the rest is there."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from app.calibrate.folder import CalibrationFolder
+from app.experiment.captures import newest_pair, write_capture
+from app.experiment.folder import ExperimentSettings, create_experiment, write_manifest
+from app.experiment.results import write_result
+from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
+from app.experiment.shift_files import write_shifts
+from app.files.provenance import provenance
+from app.report.finding import Finding, read_finding
+from app.report.page import render_report, write_report
+from calibration.record import Record, SeenBoard
+from core.geometry import Box, looking_along_y
+from core.problem import ShiftMeasurement
+from core.result import Solution
+from core.scene import FixedTexture, Inlet, Patch, Scene, View
+from drivers.burst import CapturePlan
+from drivers.capture import run_capture
+from drivers.simulated import SimulatedCamera
+from tests.drivers.scenes import pattern
+
+ROOM = Box(lower_m=(-1.0, -1.0, -1.0), upper_m=(1.0, 1.0, 1.0))
+SUPPLY = Patch(wall="x_min", lower_m=(-0.5, 0.0), upper_m=(0.5, 0.5))
+INLET = Inlet(patch=SUPPLY, temperature_k=300.0, velocity_m_s=(0.5, 0.0, 0.0))
+HEADINGS = ("What the camera saw", "How far the pattern moved", "The air", "What was assumed")
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """An experiment with its captures and one result on disk."""
+    camera = looking_along_y(position_m=(0.0, -3.0, 0.0), width_px=128, height_px=96, focal_px=200.0)
+    scene = Scene(room=ROOM, views=(View(camera=camera),), light=FixedTexture(), boundary=(INLET,))
+    settings = ExperimentSettings(rig=RigSettings(camera=SimulatedCameraSettings()), scene=scene)
+    experiment = create_experiment(tmp_path_factory.mktemp("kept") / "experiment", settings)
+    for role in ("reference", "flow"):
+        burst = run_capture(SimulatedCamera(pattern, seed=1), CapturePlan(kind=role, frames=2))
+        write_capture(experiment.captures_folder / f"1-{role}", burst)
+    captures = newest_pair(experiment)
+    axis = np.linspace(-1.0, 1.0, 5)
+    temperature_k = 293.0 + np.add.outer(np.add.outer(axis, axis), axis)
+    solution = Solution(axis, axis, axis, temperature_k, notes=("solved",))
+    shift = ShiftMeasurement(
+        np.array([[8.0, 8.0], [24.0, 8.0]]),
+        np.array([[0.1, 0.0], [0.0, 0.2]]),
+        np.tile(np.eye(2), (2, 1, 1)),
+        16,
+    )
+    manifest = {
+        "preset": "draft", "outcome": "converged", "advice": "", "solver_s": 1.0, "wall_s": 2.0,
+        "assumed": ["nothing"], "inputs": captures.inputs,
+        "captures": {"reference": captures.reference.folder.name, "flow": captures.flow.folder.name},
+        **provenance(),
+    }  # fmt: skip
+    folder = experiment.results_folder / "one"
+    folder.mkdir(parents=True)
+    write_result(folder / "result.nc", solution, {})
+    write_shifts(folder, (shift,))
+    write_manifest(folder, manifest)
+    return Finding(experiment, "one", manifest, solution, lambda: (shift,), lambda: captures)
+
+
+def missing(page):
+    return re.findall(r'<p class="missing">(.*?)</p>', page)
+
+
+def test_a_report_from_memory_is_the_report_from_the_disk(kept):
+    page = render_report(kept)
+    assert render_report(read_finding(kept.experiment, kept.experiment.results_folder / "one")) == page
+    assert missing(page) == []
+    assert all(heading in page for heading in HEADINGS)
+    assert "There is no truth" in page
+    for entry in kept.manifest["inputs"].values():
+        assert entry["sha256"] in page
+
+
+def test_a_guide_left_half_way_costs_its_own_section_only(kept):
+    folder = CalibrationFolder(kept.experiment.folder)
+    points = tuple((0.1 * i, 0.1 * j, 0.0) for i in range(4) for j in range(3))
+    boards = tuple(
+        SeenBoard(name, name, points, tuple((10.0 * i, 10.0 * j) for i in range(4) for j in range(3)))
+        for name in ("one", "two")
+    )
+    folder.save_record(Record("camera", (128, 96), boards=boards))
+    page = render_report(kept)
+    (why,) = missing(page)
+    assert "2 usable board views; expected at least 3" in why
+    assert all(heading in page for heading in HEADINGS)
+    record = kept.experiment.folder / "calibration" / "record-camera.json"
+    record.write_text("{")
+    (why,) = missing(render_report(kept))
+    assert "record-camera.json" in why
+    record.unlink()
+
+
+def test_a_truth_that_cannot_be_read_costs_the_comparison_only(kept):
+    truth = kept.experiment.folder / "truth.npz"
+    truth.write_text("no volume")
+    page = render_report(read_finding(kept.experiment, kept.experiment.results_folder / "one"))
+    truth.unlink()
+    assert len(missing(page)) == 2
+    assert all("truth.npz is not a readable NPZ" in why for why in missing(page))
+    assert page.count("data:image/png") == render_report(kept).count("data:image/png")
+
+
+def test_a_picture_and_a_shift_that_cannot_be_read_cost_their_own_sections_only(kept):
+    folder = kept.experiment.results_folder / "one"
+    picture = kept.experiment.captures_folder / kept.manifest["captures"]["flow"] / "flow.tif"
+    content, shift = picture.read_bytes(), (folder / "shift-0.nc").read_bytes()
+    picture.write_bytes(content[:-1])
+    (folder / "shift-0.nc").write_bytes(b"")
+    page = render_report(read_finding(kept.experiment, folder))
+    picture.write_bytes(content)
+    (folder / "shift-0.nc").write_bytes(shift)
+    saw, moved = missing(page)
+    assert "flow.tif is not the file that was kept" in saw
+    assert "shift-0.nc is not a readable shift file" in moved
+    # The air is drawn, and the first sentence says why it is missing.
+    assert page.count("data:image/png") == 1
+    assert "Not told:" in page
+
+
+def test_a_result_of_an_older_program_is_reported_with_what_it_has(kept):
+    folder = kept.experiment.results_folder / "one"
+    manifest = json.loads((folder / "manifest.json").read_text())
+    old = manifest | {"choices": [], "inputs": {"flow_manifest": {"file": "manifest.json", "sha256": "ab12"}}}
+    (folder / "manifest.json").write_text(json.dumps(old))
+    page = write_report(read_finding(kept.experiment, folder), folder).read_text()
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    assert "manifest.json, sha256 ab12" in page
+    assert missing(page) == []
