@@ -21,6 +21,7 @@ from calibration.graycode import frame_count
 from calibration.guide import CAMERA_PLAN, PROJECTOR_PLAN, WantedView, unmet
 from calibration.record import Placement, Record, SeenBoard
 from drivers.capture import Abort
+from drivers.settings import held
 
 # Exposures are whole multiples of the one in use, so that a projector's periods stay whole.
 EXPOSURE_FACTORS = (1, 2, 3, 4)
@@ -232,18 +233,14 @@ class GuidedCalibration:
         return ()
 
     def _exposures(self, shooter: Shooter, frames: int) -> None:
-        """Bursts at several exposure times under one light; the operator's exposure is put back."""
+        """Bursts at several exposure times under one light."""
         camera = self._stage.camera
         own_s = camera.exposure_s
         if own_s is None:
             return
-        try:
-            for factor in EXPOSURE_FACTORS if self._stage.display else EXPOSURE_PARTS:
-                camera.exposure_s = own_s * factor
-                granted_s = camera.exposure_s
-                shooter.burst(self._folder / f"exposure_{granted_s:.6g}", frames)
-        finally:
-            camera.exposure_s = own_s
+        for factor in EXPOSURE_FACTORS if self._stage.display else EXPOSURE_PARTS:
+            with held(camera, own_s * factor) as (exposure, _):
+                shooter.burst(self._folder / f"exposure_{exposure.granted:.6g}", frames)
 
     def _camera(self, name: str) -> Step:
         pictures = Pictures(self._folder, name, self._full_scale())

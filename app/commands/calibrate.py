@@ -78,7 +78,7 @@ def camera(
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
     frames: Frames = 1,
-    every: Every = None,
+    every_s: Every = None,
     retake: Retake = None,
     as_json: AsJson = False,
 ) -> None:
@@ -88,7 +88,7 @@ def camera(
     known = told(ambient_temperature_k, minutes_on)
     if images is None:
         plan = LivePlan(StepName.camera, camera, target, frames)
-        live(folder, plan, LiveOptions(every, retake=tuple(retake or ())), known, as_json)
+        live(folder, plan, LiveOptions(every_s, retake=tuple(retake or ())), known, as_json)
         return
     pictures = Pictures(images, pattern, full_scale(bits))
     run(lambda say: calibrate_camera(folder, camera, pictures, target, say), folder, known, as_json)
@@ -112,8 +112,8 @@ def projector(
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
     frames: Frames = 1,
-    settle: Settle = 0.2,
-    every: Every = None,
+    settle_s: Settle = 0.2,
+    every_s: Every = None,
     screen: Screen = "kiosk",
     port: Port = 8766,
     retake: Retake = None,
@@ -124,8 +124,8 @@ def projector(
     target = needed_board(chosen_board(folder, board, grid, square, marker, dictionary))
     known = told(ambient_temperature_k, minutes_on)
     if images is None:
-        plan = LivePlan(StepName.projector, camera, target, frames, settle_s=settle)
-        live(folder, plan, LiveOptions(every, screen, port, tuple(retake or ())), known, as_json)
+        plan = LivePlan(StepName.projector, camera, target, frames, settle_s=settle_s)
+        live(folder, plan, LiveOptions(every_s, screen, port, tuple(retake or ())), known, as_json)
         return
     pictures = Pictures(images, pattern, full_scale(bits), white_first)
     panel = panel_size(folder, projector_px)
@@ -151,7 +151,7 @@ def wall(
         str | None, typer.Option(help="World X,Z [m] of the camera: X,Z (the scene's).")
     ] = None,
     wall_y: Annotated[float | None, typer.Option(help="World y of the wall [m] (the scene's).")] = None,
-    plumb: Annotated[
+    plumb_px: Annotated[
         str | None, typer.Option(help="Lower and upper end of a vertical line on the wall: U,V,U,V.")
     ] = None,
     camera: CameraName = "camera",
@@ -159,8 +159,8 @@ def wall(
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
     frames: Frames = 1,
-    settle: Settle = 0.2,
-    every: Every = None,
+    settle_s: Settle = 0.2,
+    every_s: Every = None,
     screen: Screen = "kiosk",
     port: Port = 8766,
     as_json: AsJson = False,
@@ -168,11 +168,11 @@ def wall(
     """Find the back wall and place camera and projector in the room: live, or from --images, --level-image."""
     folder = CalibrationFolder(experiment)
     target = chosen_board(folder, board, grid, square, marker, dictionary)
-    placement = make_placement(folder, anchor, camera_at, wall_y, plumb)
+    placement = make_placement(folder, anchor, camera_at, wall_y, plumb_px)
     known = told(ambient_temperature_k, minutes_on)
     if images is None and level_image is None:
-        plan = LivePlan(StepName.wall, camera, target, frames, settle_s=settle, placement=placement)
-        live(folder, plan, LiveOptions(every, screen, port), known, as_json)
+        plan = LivePlan(StepName.wall, camera, target, frames, settle_s=settle_s, placement=placement)
+        live(folder, plan, LiveOptions(every_s, screen, port), known, as_json)
         return
     level = None if level_image is None else (level_image, needed_board(target))
     pictures = None if images is None else Pictures(images, pattern, full_scale(bits))
@@ -188,9 +188,9 @@ def response(
     camera: CameraName = "camera",
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
-    frames: Annotated[int, typer.Option(min=2, max=1000, help="Live: frames a burst.")] = 16,
-    settle: Settle = 0.2,
-    every: Every = None,
+    response_frames: Annotated[int, typer.Option(min=2, max=1000, help="Live: frames a burst.")] = 16,
+    settle_s: Settle = 0.2,
+    every_s: Every = None,
     screen: Screen = "kiosk",
     port: Port = 8766,
     as_json: AsJson = False,
@@ -199,8 +199,8 @@ def response(
     folder = CalibrationFolder(experiment)
     known = told(ambient_temperature_k, minutes_on)
     if images is None:
-        plan = LivePlan(StepName.response, camera, None, response_frames=frames, settle_s=settle)
-        run_live(experiment, plan, LiveOptions(every, screen, port))
+        plan = LivePlan(StepName.response, camera, None, response_frames=response_frames, settle_s=settle_s)
+        run_live(experiment, plan, LiveOptions(every_s, screen, port))
         note_conditions(folder, conditions_of(folder.settings(), known))
         bundle = folder.bundle()
     else:

@@ -22,6 +22,7 @@ from core.fields import GridField
 from core.geometry import Box, Optics, crop, rotation_matrix, rotation_vector
 from core.render import render_flow, render_reference
 from core.scene import FixedTexture, ProjectedPattern, Scene, WaveletPattern
+from drivers.burst import CaptureRole
 from drivers.clock import SystemClock
 from drivers.display import PatternDisplay, Picture
 from drivers.projector.escvp21 import EscVp21
@@ -46,6 +47,11 @@ def open_camera(experiment: Experiment, air: AirState, view: int = 0) -> Camera:
     if isinstance(settings, SimulatedCameraSettings):
         return _simulated_camera(experiment, settings, air, view)
     return open_v4l2(settings)
+
+
+def air_of(role: CaptureRole) -> AirState:
+    """What the air of a simulated room does during a capture of that role."""
+    return "moving" if role == "flow" else "still"
 
 
 def open_projector(experiment: Experiment) -> Projector:

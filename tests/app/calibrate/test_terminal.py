@@ -63,7 +63,7 @@ def calibrated(tmp_path_factory) -> tuple[Path, Optics, Optics]:
     folder = tmp_path_factory.mktemp("live") / "experiment"
     camera, projector = experiment(folder, 0.4)
     for step in ("camera", "projector", "wall", "response"):
-        done = run(step, folder, "--minutes-on", 45, *([] if step == "camera" else ["--settle", 0]))
+        done = run(step, folder, "--minutes-on", 45, *([] if step == "camera" else ["--settle-s", 0]))
         assert done.exit_code == 0, (step, done.output, done.exception)
     return folder, camera, projector
 
@@ -143,7 +143,7 @@ def test_half_a_sequence_is_taken_anew_and_ctrl_c_keeps_the_whole_ones(tmp_path)
     folder = tmp_path / "stopped"
     experiment(folder, 0.25)
     places = folder / "calibration" / "live-projector"
-    command = [*AIRLENS, "projector", str(folder), "--settle", "0.1"]
+    command = [*AIRLENS, "projector", str(folder), "--settle-s", "0.1"]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     until_s = time.monotonic() + 200
     while len(list(places.glob("place_01/*.png"))) < 3 and time.monotonic() < until_s:
