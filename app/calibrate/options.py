@@ -58,6 +58,10 @@ Retake = Annotated[
     list[str] | None, typer.Option(help="Live: forget this view first, such as view_03.png or place_02.")
 ]
 
+Discard = Annotated[
+    bool, typer.Option("--discard", help="Only forget what this step has taken and not completed.")
+]
+
 
 def make_board(kind: BoardKind, grid: str, square: str, marker: str | None, dictionary: str) -> Board:
     """The board that the options describe. Raises BadInputError."""

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from app.calibrate.folder import CalibrationFolder
-from app.calibrate.guide import GuidedCalibration, LivePlan, StepName
+from app.calibrate.folder import CalibrationFolder, StepName
+from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.cli import create_cli
 from app.experiment.folder import ExperimentSettings, create_experiment
 from app.experiment.rig_settings import BoardSettings, RigSettings, SimulatedCameraSettings
@@ -154,7 +154,7 @@ def test_half_a_sequence_is_taken_anew_and_ctrl_c_keeps_the_whole_ones(tmp_path)
     assert process.returncode == 1
     assert "goes on from there" in said
     assert "1 usable board views; expected at least 3" in said or "not complete" in said
-    record = CalibrationFolder(folder).record("camera")
+    record = CalibrationFolder(folder).collected("camera")
     assert record is not None
     assert [board.name for board in record.boards] == ["place_00/graycode"]
     assert 0 < len(list(places.glob("place_01/*.png"))) < 38
