@@ -14,7 +14,7 @@ from jaxtyping import Float
 from calibration.adjustment import Device, Sighting
 from calibration.advice import advise, coverage
 from calibration.bundle import CalibratedOptics, CalibratedWall, Quality
-from calibration.errors import CalibrationError, TooFewViewsError
+from calibration.errors import TooFewViewsError
 from calibration.flat_wall import FlatWall, adjust_on_wall
 from calibration.intrinsics import Intrinsics, fit_intrinsics
 from calibration.pair import Pair, fit_pair
