@@ -13,9 +13,9 @@ from app.errors import AirlensError
 from app.experiment.captures import Capture, load_capture
 from app.experiment.folder import Experiment, read_manifest
 from app.rig.conditions import UNTOLD, Conditions, conditions_in, conditions_of
+from calibration.age import warnings_for
 from calibration.bundle import from_json
 from calibration.errors import CalibrationError
-from calibration.handover import warnings_for
 from drivers.burst import Burst
 from drivers.quick_look import quick_look
 from drivers.verdict import Verdict

@@ -62,7 +62,10 @@ class BoardSettings(Strict):
 
 
 class ProjectorSettings(Strict):
-    """How the projector is spoken to: `airlens projector` takes the same address; `simulated:` is a twin."""
+    """How the projector is spoken to: `airlens projector` takes the same address.
+
+    `simulated:?warm_up_s=15&cool_down_s=10` is a twin, of an Epson unless a dialect stands after the colon.
+    """
 
     url: str
 

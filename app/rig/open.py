@@ -25,15 +25,10 @@ from core.scene import FixedTexture, ProjectedPattern, Scene, WaveletPattern
 from drivers.burst import CaptureRole
 from drivers.clock import SystemClock
 from drivers.display import PatternDisplay, Picture
-from drivers.projector.escvp21 import EscVp21
-from drivers.projector.link import ProjectorLink
 from drivers.projector.protocol import Projector
 from drivers.protocols import Camera
 from drivers.simulated import SensorNoise, SimulatedCamera, SimulatedDisplay
-from drivers.simulated.projector.engine import SimulatedProjector
-from drivers.simulated.projector.escvp21 import EscVp21Twin
-from drivers.simulated.projector.hosts import LoopPort
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.open import TWINS, open_twin
 
 AirState = Literal["still", "moving"]
 
@@ -66,16 +61,17 @@ def open_projector(experiment: Experiment) -> Projector:
 
 
 def _twin(url: str) -> Projector:
-    """The twin of an Epson; `simulated:?warm_up_s=15&cool_down_s=10` sets its times."""
-    asked = parse_qs(urlsplit(url).query)
+    """The twin of a dialect (else of an Epson): `simulated:benq?warm_up_s=15&cool_down_s=10` sets its times."""
     try:
+        parts = urlsplit(url)
+        asked = parse_qs(parts.query)
         warm_up_s, cool_down_s = (float(asked[name][-1]) for name in ("warm_up_s", "cool_down_s"))
+        return open_twin(parts.path or "escvp21", SystemClock(), warm_up_s, cool_down_s)
     except (KeyError, ValueError) as error:
         raise BadInputError(
-            f"{url!r} is no simulated projector ({error}); expected simulated:?warm_up_s=15&cool_down_s=10."
+            f"{url!r} is no simulated projector ({error}); expected simulated:?warm_up_s=15&cool_down_s=10, "
+            f"the dialect after the colon: {', '.join(TWINS)}."
         ) from None
-    state = ProjectorState(SystemClock(), warm_up_s, cool_down_s)
-    return ProjectorLink(EscVp21(), LoopPort(SimulatedProjector(EscVp21Twin(state))))
 
 
 def open_stage(
