@@ -5,7 +5,6 @@ from dataclasses import fields
 from typing import Any, get_args
 
 import pytest
-import typer.main
 from typer.testing import CliRunner
 
 from app.api.models.captures import NewCapture, Role
@@ -14,6 +13,8 @@ from app.api.resources.captures import order_of
 from app.capture.burst import Order
 from app.capture.service import CaptureDesk
 from app.cli import create_cli
+from app.commands import COMMANDS
+from app.commands.lazy import commands_of
 from app.experiment.captures import load_capture
 from app.experiment.folder import Experiment
 from app.rig.conditions import Conditions
@@ -28,13 +29,11 @@ ORDER = {field.name for field in fields(Order)} - {"plan", "told"}
 SHELL = {"experiment", "as_json", "on_abort", "help"}
 
 
-CLI = typer.main.get_command(create_cli())
-
-
 def options_of(*path: str) -> dict[str, Any]:
     """A command's options by the names of their fields."""
-    command: Any = CLI
-    for name in path:
+    first, *rest = path
+    command: Any = commands_of(COMMANDS[first][0])[first]
+    for name in rest:
         command = command.commands[name]
     return {p.name: p for p in command.params if p.param_type_name == "option"}
 
