@@ -223,6 +223,11 @@ class Client:
         path = f"/experiments/{experiment}/calibration/views/{view}"
         return self._ask(GuideResource, "DELETE", path, query={"step": step})
 
+    def discard_guided(self, experiment: str, step: StepText = "camera") -> GuideResource:
+        """Forget what a step has taken and not completed."""
+        path = f"/experiments/{experiment}/calibration/guide"
+        return self._ask(GuideResource, "DELETE", path, query={"step": step})
+
     def captures(self, experiment: str) -> list[CaptureResource]:
         """List the captures of an experiment."""
         return self._ask(list[CaptureResource], "GET", f"/experiments/{experiment}/captures")

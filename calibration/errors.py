@@ -1,6 +1,7 @@
 """What can go wrong in a calibration: the message says what was seen, what was expected, what to retake.
 
 CalibrationError
+ ├─ TooFewViewsError    fewer views of a board than a model needs: none is at fault, more are wanted
  ├─ BundleError    a bundle that cannot be read or lacks a part
  └─ ImageError     images that cannot be used: unreadable, mixed sizes, out of order, missing
 """
@@ -8,6 +9,10 @@ CalibrationError
 
 class CalibrationError(ValueError):
     """A calibration that cannot be made from what was given."""
+
+
+class TooFewViewsError(CalibrationError):
+    """Fewer usable views of a board than a model needs."""
 
 
 class BundleError(CalibrationError):

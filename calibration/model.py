@@ -14,7 +14,7 @@ from jaxtyping import Float
 from calibration.adjustment import Device, Sighting
 from calibration.advice import advise, coverage
 from calibration.bundle import CalibratedOptics, CalibratedWall, Quality
-from calibration.errors import CalibrationError
+from calibration.errors import TooFewViewsError
 from calibration.flat_wall import FlatWall, adjust_on_wall
 from calibration.intrinsics import Intrinsics, fit_intrinsics
 from calibration.pair import Pair, fit_pair
@@ -78,7 +78,7 @@ def build(record: Record) -> Model:
 
 def _camera(record: Record) -> Intrinsics:
     if len(record.boards) < MINIMUM_VIEWS:
-        raise CalibrationError(
+        raise TooFewViewsError(
             f"{len(record.boards)} usable board views; expected at least {MINIMUM_VIEWS}, better 8 to 20. "
             "Take more, each with the board elsewhere and tilted; those found so far are kept."
         )

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from calibration.adjustment import Adjusted, Device, Pose, Sighting, adjust
+from calibration.adjustment import Adjusted, Pose, Sighting, adjust
 from calibration.intrinsics import Intrinsics, fit_intrinsics
 
 
@@ -63,8 +63,3 @@ def _relative(in_camera: list[Pose], in_projector: tuple[Pose, ...]) -> tuple[np
         translations.append(b.translation_m - rotation.apply(a.translation_m))
     mean = Rotation.from_quat(np.stack(rotations)).mean()
     return mean.as_rotvec(), np.median(np.stack(translations), axis=0)
-
-
-def projector_from_camera(device: Device) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation matrix and translation [m] that carry camera coordinates to projector coordinates."""
-    return Rotation.from_rotvec(device.rotation_rad).as_matrix(), device.translation_m

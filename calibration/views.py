@@ -57,22 +57,6 @@ def view_of(name: str, image: Image, board: Board, full_scale: int | None = None
     return BoardView(name, width, height, detection, points_m, edge_px, tuple(issues))
 
 
-def one_size(views: tuple[BoardView, ...]) -> tuple[int, int]:
-    """Width and height shared by all views.
-
-    Raises:
-        ImageError: pictures of different sizes, or none.
-    """
-    sizes = {(v.width_px, v.height_px): v.name for v in views}
-    if len(sizes) != 1:
-        listed = ", ".join(f"{name} is {w} x {h}" for (w, h), name in sizes.items()) or "no picture"
-        raise ImageError(
-            f"The pictures have {len(sizes)} sizes ({listed}); expected one. "
-            "Retake all with the same camera mode, or leave the odd ones out."
-        )
-    return next(iter(sizes))
-
-
 def digest(image: Image) -> str:
     """SHA-256 of the picture's values."""
     return hashlib.sha256(np.ascontiguousarray(image).tobytes()).hexdigest()

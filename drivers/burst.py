@@ -10,31 +10,30 @@ from jaxtyping import Float32
 
 from drivers.errors import DeviceSettingError
 from drivers.protocols import CameraInfo
+from drivers.settings import Setting
 from drivers.verdict import Verdict
 
-CaptureKind = Literal["reference", "flow", "dark", "flat"]
+CaptureRole = Literal["reference", "flow", "dark", "flat"]
 
 
 @dataclass(frozen=True)
 class CapturePlan:
-    """A burst as data. Settings left at None stay as the operator has them.
+    """A burst as data. `exposure_s` and `gain` hold for this burst; left at None they are the operator's.
 
-    `settle_s` is waited first; then frames are discarded until two in a row agree in their mean to
-    `settle_tolerance` (a part of it), at most `settle_frames` of them. `max_refused` ends a burst whose
-    camera keeps losing frames. `refresh_hz` is the projector's: exposures that are not a whole number of
-    its periods are warned of. `warm_up_s`: how long the rig should have been on.
+    `settle_s` is waited first; then frames are discarded until two in a row are equally bright, at most
+    `settle_frames` of them. `max_refused` ends a burst whose camera keeps losing frames. `refresh_hz` is
+    the projector's: exposures that are not a whole number of its periods are warned of. `raw_stack` keeps
+    every frame.
     """
 
-    kind: CaptureKind = "reference"
+    role: CaptureRole = "reference"
     frames: int = 100
     exposure_s: float | None = None
     gain: float | None = None
     settle_s: float = 0.0
-    settle_tolerance: float = 0.002
     settle_frames: int = 30
     max_refused: int = 100
     refresh_hz: float | None = None
-    warm_up_s: float = 1800.0
     raw_stack: bool = False
 
     def __post_init__(self) -> None:
@@ -62,15 +61,6 @@ class FrameRecord:
     timestamp_s: float
     level: float
     saturated: float
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A setting as asked for, and as the device has it (None: it has no such control)."""
-
-    name: str
-    asked: float | None
-    granted: float | None
 
 
 @dataclass(frozen=True)

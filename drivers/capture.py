@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.burst import Burst, BurstOutcome, CapturePlan, FrameRecord, Progress, Setting
-from drivers.clock import Clock, SystemClock
-from drivers.errors import DeviceNotFoundError, DeviceSettingError, DeviceTimeoutError, FrameError, FrameFault
+from drivers.burst import Burst, BurstOutcome, CapturePlan, FrameRecord, Progress
+from drivers.clock import Clock, SystemClock, wait_until
+from drivers.errors import DeviceNotFoundError, DeviceTimeoutError, FrameError, FrameFault
 from drivers.moments import RunningMoments
-from drivers.protocols import Camera, Frame
+from drivers.protocols import Camera, CameraInfo, Frame
+from drivers.settings import Setting, check_granted, held
 from drivers.verdict import (
     Verdict,
     judge_beat,
@@ -29,6 +30,9 @@ from drivers.verdict import (
 
 OnProgress = Callable[[Progress], object]
 Abort = Callable[[], bool]
+
+# Two frames in a row are equally bright when their levels differ by no more than this part.
+SETTLE_TOLERANCE = 0.002
 
 
 @dataclass(frozen=True)
@@ -58,36 +62,68 @@ def run_capture(
     `on_frame` receives every good frame; `rig_on_s` is how long the rig has been on.
     Raises DeviceSettingError when a setting is not granted, DeviceError when not even one frame came.
     """
-    settings = _apply(camera, plan)
-    (clock or SystemClock()).sleep_s(plan.settle_s)
-    taker = _Taker(camera, plan, abort or (lambda: False))
-    settled = _settle(taker, plan)
-    moments, records, full_scale = RunningMoments(), [], 1
-    while taker.outcome is BurstOutcome.COMPLETE and len(records) < plan.frames:
+    clock, stop = clock or SystemClock(), abort or (lambda: False)
+    with held(camera, plan.exposure_s, plan.gain) as settings:
+        check_granted(settings)
+        info = camera.info  # now, for a camera that is lost meanwhile tells nothing
+        wait_until(clock, clock.now_s() + plan.settle_s, stop)
+        taker = _Taker(camera, plan, stop)
+        settled = _settle(taker, plan)
+        frames = _take_frames(taker, plan, on_progress, on_frame)
+        if not frames.records and taker.lost is not None:
+            raise taker.lost
+        return _burst(info, plan, settings, taker, frames, settled, rig_on_s)
+
+
+@dataclass
+class _Frames:
+    """What was taken: sums of pixels, and one record a frame."""
+
+    moments: RunningMoments
+    records: list[FrameRecord]
+    full_scale_counts: int = 1
+
+
+def _take_frames(
+    taker: "_Taker", plan: CapturePlan, on_progress: OnProgress | None, on_frame: OnFrame | None
+) -> _Frames:
+    frames = _Frames(RunningMoments(), [])
+    while taker.outcome is BurstOutcome.COMPLETE and len(frames.records) < plan.frames:
         frame = taker.take()
         if frame is None:
             continue
         record = _record(frame)
-        moments.add(frame.pixels)
-        records.append(record)
-        full_scale = frame.full_scale_counts
+        frames.moments.add(frame.pixels)
+        frames.records.append(record)
+        frames.full_scale_counts = frame.full_scale_counts
         if on_frame:
-            on_frame(Taken(frame, record, moments))
+            on_frame(Taken(frame, record, frames.moments))
         if on_progress:
-            on_progress(Progress(len(records), plan.frames, taker.refused.total(), record.level))
-    if not records and taker.lost is not None:
-        raise taker.lost
+            on_progress(Progress(len(frames.records), plan.frames, taker.refused.total(), record.level))
+    return frames
+
+
+def _burst(
+    camera: CameraInfo,
+    plan: CapturePlan,
+    settings: tuple[Setting, ...],
+    taker: "_Taker",
+    frames: _Frames,
+    settled: tuple[Verdict, ...],
+    rig_on_s: float | None,
+) -> Burst:
+    moments, records, full_scale = frames.moments, frames.records, frames.full_scale_counts
     if not records:
-        moments.add(np.zeros((camera.info.height_px, camera.info.width_px), np.uint16))
+        moments.add(np.zeros((camera.height_px, camera.width_px), np.uint16))
     mean, std = moments.mean(full_scale), moments.std(full_scale)
     judged = (
         *settled,
         *_judge_moments(mean, std, plan, len(records)),
-        *_judge_records(records, plan, camera, taker.refused.total(), rig_on_s),
+        *_judge_records(records, plan, settings[0].granted, taker.refused.total(), rig_on_s),
     )
     refused = {str(fault): count for fault, count in taker.refused.items()}
     return Burst(
-        mean, std, plan, taker.outcome, camera.info, full_scale, settings, tuple(records), refused, judged
+        mean, std, plan, taker.outcome, camera, full_scale, settings, tuple(records), refused, judged
     )
 
 
@@ -125,26 +161,6 @@ class _Taker:
             self.outcome, self.lost = BurstOutcome.TOO_MANY_REFUSED, error
 
 
-def _apply(camera: Camera, plan: CapturePlan) -> tuple[Setting, ...]:
-    if plan.exposure_s is not None:
-        camera.exposure_s = plan.exposure_s
-    if plan.gain is not None:
-        camera.gain = plan.gain
-    settings = (
-        Setting("exposure_s", plan.exposure_s, camera.exposure_s),
-        Setting("gain", plan.gain, camera.gain),
-    )
-    for one in settings:
-        if one.asked is None:
-            continue
-        if one.granted is None or abs(one.granted - one.asked) > 0.01 * abs(one.asked) + 1e-4:
-            raise DeviceSettingError(
-                f"{one.name} is {one.granted} after {one.asked:g} was asked for. "
-                "Choose a value that the camera has, and switch its automatic control off."
-            )
-    return settings
-
-
 def _settle(taker: _Taker, plan: CapturePlan) -> tuple[Verdict, ...]:
     """Discard frames until two in a row have the same brightness; cameras differ in how long that takes."""
     before, change = None, float("inf")
@@ -156,16 +172,14 @@ def _settle(taker: _Taker, plan: CapturePlan) -> tuple[Verdict, ...]:
             continue
         level = _record(frame).level
         change = abs(level - before) / max(level, 1e-9) if before is not None else change
-        if change <= plan.settle_tolerance:
+        if change <= SETTLE_TOLERANCE:
             return ()
         before = level
     if plan.settle_frames < 2:
         return ()
     advice = "Switch automatic exposure, gain and dynamic iris off; wait until the projector is steady."
     return (
-        Verdict(
-            "settling", False, change, f"two frames alike to {plan.settle_tolerance:g} of the level", advice
-        ),
+        Verdict("settling", False, change, f"two frames alike to {SETTLE_TOLERANCE:g} of the level", advice),
     )
 
 
@@ -180,17 +194,20 @@ def _record(frame: Frame) -> FrameRecord:
 def _judge_moments(mean: np.ndarray, std: np.ndarray, plan: CapturePlan, frames: int) -> tuple[Verdict, ...]:
     if frames == 0:
         return ()
-    if plan.kind == "dark":
+    if plan.role == "dark":
         return (judge_dark(mean),)
-    if plan.kind == "flat":
+    if plan.role == "flat":
         return (judge_level(mean),)
     return judge_images(mean, std, frames)
 
 
 def _judge_records(
-    records: list[FrameRecord], plan: CapturePlan, camera: Camera, refused: int, rig_on_s: float | None
+    records: list[FrameRecord],
+    plan: CapturePlan,
+    exposure_s: float | None,
+    refused: int,
+    rig_on_s: float | None,
 ) -> list[Verdict]:
-    exposure_s = camera.exposure_s
     verdicts = [
         judge_saturation([record.saturated for record in records], exposure_s),
         judge_flicker([record.level for record in records]),
@@ -199,5 +216,5 @@ def _judge_records(
     if plan.refresh_hz is not None and exposure_s is not None:
         verdicts.append(judge_beat(exposure_s, plan.refresh_hz))
     if rig_on_s is not None:
-        verdicts.append(judge_warm_up(rig_on_s, plan.warm_up_s))
+        verdicts.append(judge_warm_up(rig_on_s))
     return verdicts

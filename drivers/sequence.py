@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 from drivers.burst import Burst
 from drivers.capture import Abort
-from drivers.clock import Clock, SystemClock
+from drivers.clock import Clock, SystemClock, wait_until
 from drivers.errors import DeviceSettingError
-
-SLICE_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,7 @@ def run_sequence(
     clock, stop = clock or SystemClock(), abort or (lambda: False)
     began_s, done = clock.now_s(), []
     for number, due_s in enumerate(starts_s):
-        while clock.now_s() - began_s < due_s and not stop():
-            clock.sleep_s(min(SLICE_S, due_s - (clock.now_s() - began_s)))
+        wait_until(clock, began_s + due_s, stop)
         if stop():
             break
         start = BurstStart(number, due_s, clock.now_s() - began_s)

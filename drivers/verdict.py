@@ -15,6 +15,7 @@ MIN_CONTRAST = 0.03
 FEATURE_PX = (3.0, 24.0)
 MAX_FLICKER = 0.002
 MAX_BEAT = 0.02
+WARM_UP_S = 1800.0
 
 
 @dataclass(frozen=True)
@@ -116,14 +117,14 @@ def judge_beat(exposure_s: float, refresh_hz: float) -> Verdict:
     )
 
 
-def judge_warm_up(on_s: float, warm_up_s: float) -> Verdict:
+def judge_warm_up(on_s: float) -> Verdict:
     """Return the verdict on how long the rig has been on."""
     return Verdict(
         "warm-up",
-        on_s >= warm_up_s,
+        on_s >= WARM_UP_S,
         on_s,
-        f"on for at least {warm_up_s:g} s",
-        f"Wait {max(0.0, warm_up_s - on_s):.0f} s more: lamps and lenses move while they warm up.",
+        f"on for at least {WARM_UP_S:g} s",
+        f"Wait {max(0.0, WARM_UP_S - on_s):.0f} s more: lamps and lenses move while they warm up.",
     )
 
 

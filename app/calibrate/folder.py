@@ -1,13 +1,16 @@
 """The calibration of an experiment on disk: the record of what was seen, and the bundle made from it.
 
 calibration/bundle.json            what the reconstruction reads
-calibration/record-<camera>.json   board and wall points, so that each step adds to the ones before
+calibration/record-<camera>.json   board and wall points that the bundle was made from
+calibration/started-<step>-<camera>.json   the same, of a step that is not complete: used by nothing yet
 calibration/flat-<camera>.tif      flat field, if measured
 """
 
 import dataclasses
 import datetime as dt
+import shutil
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 
 from app.errors import BadInputError
@@ -18,6 +21,15 @@ from calibration.bundle import Bundle, to_json
 from calibration.errors import CalibrationError
 from calibration.model import Model
 from calibration.record import Record, record_from_json, record_to_json
+
+
+class StepName(StrEnum):
+    """What is calibrated, in this order."""
+
+    camera = "camera"
+    projector = "projector"
+    wall = "wall"
+    response = "response"
 
 
 @dataclass(frozen=True)
@@ -42,20 +54,63 @@ class CalibrationFolder:
         return read_bundle(self.experiment) or Bundle(date=now())
 
     def record(self, camera: str) -> Record | None:
-        """What was seen so far. Raises BadInputError."""
+        """What was seen, of the camera that the bundle holds as measured. Raises BadInputError."""
         path = self._record_path(camera)
-        if not path.exists():
+        if not path.exists() or not any(
+            one.name == camera and one.quality.source == "measured" for one in self.bundle().cameras
+        ):
             return None
-        try:
-            return record_from_json(path.read_text(encoding="utf-8"), str(path))
-        except (CalibrationError, UnicodeDecodeError) as error:
-            raise BadInputError(str(error)) from error
+        return _read_record(path)
 
-    def save_record(self, record: Record) -> None:
-        """Keep what was seen, also when it is not yet enough for a model."""
-        write_text(self._record_path(record.camera), record_to_json(record))
+    def collected(self, camera: str) -> Record | None:
+        """What was seen so far, that of a started step included. Raises BadInputError."""
+        step = self.started(camera)
+        return self.record(camera) if step is None else _read_record(self._started_path(step, camera))
 
-    def save_model(self, model: Model) -> Bundle:
+    def started(self, camera: str) -> StepName | None:
+        """The step that was started and is not complete: there is one at a time."""
+        return next((step for step in StepName if self._started_path(step, camera).exists()), None)
+
+    def save_started(self, step: StepName, record: Record) -> None:
+        """Keep what a step has seen so far, beside the calibration in use."""
+        if self.record(record.camera) is None and not (record.boards or record.wall or record.level):
+            self.forget_started(record.camera)
+            return
+        write_text(self._started_path(step, record.camera), record_to_json(record))
+        for other in StepName:
+            if other is not step:
+                self._started_path(other, record.camera).unlink(missing_ok=True)
+
+    def forget_started(self, camera: str) -> None:
+        """Go back to the calibration in use."""
+        for step in StepName:
+            self._started_path(step, camera).unlink(missing_ok=True)
+
+    def discard(self, step: StepName, camera: str) -> None:
+        """Forget what a step has taken since the calibration in use was made, with its live pictures."""
+        begun = self.started(camera) is step
+        if begun:
+            self.forget_started(camera)
+        kept, live = self.record(camera), self.folder / f"live-{step}"
+        unused = [live]
+        if step in (StepName.camera, StepName.projector):
+            names = set() if kept is None else {b.name.split("/")[0] for b in kept.boards}
+            unused = [path for path in live.glob("*") if path.name not in names]
+        elif step is StepName.wall and (begun or kept is None or not (kept.wall or kept.level)):
+            unused = [live, self.folder / "live-level"]
+        elif step is StepName.wall or self.bundle().response(camera) is not None:
+            unused = []
+        for path in unused:
+            shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
+
+    def put_to_use(self, model: Model) -> Bundle:
+        """Make a complete step's models and record those in use."""
+        bundle = self._save_model(model)
+        write_text(self._record_path(model.record.camera), record_to_json(model.record))
+        self.forget_started(model.record.camera)
+        return bundle
+
+    def _save_model(self, model: Model) -> Bundle:
         """Put the model's parts into the bundle, with the date and the pictures' hashes."""
         old = self.bundle()
         record = model.record
@@ -78,6 +133,16 @@ class CalibrationFolder:
 
     def _record_path(self, camera: str) -> Path:
         return self.folder / f"record-{camera}.json"
+
+    def _started_path(self, step: StepName, camera: str) -> Path:
+        return self.folder / f"started-{step}-{camera}.json"
+
+
+def _read_record(path: Path) -> Record:
+    try:
+        return record_from_json(path.read_text(encoding="utf-8"), str(path))
+    except (CalibrationError, UnicodeDecodeError) as error:
+        raise BadInputError(str(error)) from error
 
 
 def now() -> str:

@@ -7,13 +7,21 @@ session that was stopped, or killed, goes on where it was. Steps: camera -> proj
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from pathlib import Path
 
-from app.calibrate.folder import CalibrationFolder
+from app.calibrate.folder import CalibrationFolder, StepName
 from app.calibrate.pictures import OnPicture, Shooter
 from app.calibrate.response import calibrate_response
-from app.calibrate.steps import Pictures, Step, built, calibrate_camera, calibrate_projector, calibrate_wall
+from app.calibrate.steps import (
+    Pictures,
+    Step,
+    built,
+    calibrate_camera,
+    calibrate_projector,
+    calibrate_wall,
+    modelled,
+    put_to_use,
+)
 from app.errors import AirlensError, BadInputError
 from app.rig.stage import Stage, Task, TaskKind
 from calibration.board import Board
@@ -21,6 +29,7 @@ from calibration.graycode import frame_count
 from calibration.guide import CAMERA_PLAN, PROJECTOR_PLAN, WantedView, unmet
 from calibration.record import Placement, Record, SeenBoard
 from drivers.capture import Abort
+from drivers.settings import held
 
 # Exposures are whole multiples of the one in use, so that a projector's periods stay whole.
 EXPOSURE_FACTORS = (1, 2, 3, 4)
@@ -30,15 +39,6 @@ GREY_LEVELS = (0, 32, 64, 96, 128, 160, 192, 224, 255)
 _FOURFOLD_SAFE = 0.2
 
 _UNPLACED = Placement()
-
-
-class StepName(StrEnum):
-    """What is calibrated."""
-
-    camera = "camera"
-    projector = "projector"
-    wall = "wall"
-    response = "response"
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class GuidedCalibration:
     @property
     def record(self) -> Record | None:
         """What was seen so far."""
-        return self._calibration.record(self._plan.camera)
+        return self._calibration.collected(self._plan.camera)
 
     def wanted(self) -> Task | None:
         """The next thing to arrange; None when the plan is done."""
@@ -127,7 +127,17 @@ class GuidedCalibration:
         shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
         if record is None:
             return None
-        return built(self._calibration, replace(record, boards=tuple(b for b in boards if b not in gone)), [])
+        left = replace(record, boards=tuple(b for b in boards if b not in gone))
+        return built(self._calibration, self._plan.step, left, [])
+
+    def finish(self) -> bool:
+        """Put to use what the step has collected, once nothing more is wanted. Return whether it is in use."""
+        if self.wanted() is not None:
+            return False
+        record, step = self.record, self._plan.step
+        if record is None or self._calibration.started(self._plan.camera) is not step:
+            return True
+        return put_to_use(self._calibration, modelled(step, record, [])).model is not None
 
     def _check(self) -> None:
         step, plan = self._plan.step, self._plan
@@ -136,7 +146,12 @@ class GuidedCalibration:
                 "The board is not known. State it under Board on the page, by --grid and --square, or as "
                 "a [rig.board] table in experiment.toml."
             )
-        record = self.record
+        record, other = self.record, self._calibration.started(plan.camera)
+        if other not in (None, step) and step is not StepName.response:
+            raise BadInputError(
+                f"The step '{other}' is started and not complete: take or skip what it still asks for, or "
+                "discard it. Until then the calibration in use stays as it was."
+            )
         if step is StepName.projector and self._stage.display is None:
             raise BadInputError("This rig has no projector: its scene is lit otherwise.")
         if step is StepName.wall and record is None:
@@ -232,18 +247,14 @@ class GuidedCalibration:
         return ()
 
     def _exposures(self, shooter: Shooter, frames: int) -> None:
-        """Bursts at several exposure times under one light; the operator's exposure is put back."""
+        """Bursts at several exposure times under one light."""
         camera = self._stage.camera
         own_s = camera.exposure_s
         if own_s is None:
             return
-        try:
-            for factor in EXPOSURE_FACTORS if self._stage.display else EXPOSURE_PARTS:
-                camera.exposure_s = own_s * factor
-                granted_s = camera.exposure_s
-                shooter.burst(self._folder / f"exposure_{granted_s:.6g}", frames)
-        finally:
-            camera.exposure_s = own_s
+        for factor in EXPOSURE_FACTORS if self._stage.display else EXPOSURE_PARTS:
+            with held(camera, own_s * factor) as (exposure, _):
+                shooter.burst(self._folder / f"exposure_{exposure.granted:.6g}", frames)
 
     def _camera(self, name: str) -> Step:
         pictures = Pictures(self._folder, name, self._full_scale())
@@ -264,9 +275,7 @@ class GuidedCalibration:
     def _used(self, step: Callable[[], Step]) -> tuple[str, ...]:
         """What is wrong with the newest pictures; too few views yet is no fault of theirs."""
         try:
-            self.issues = tuple(
-                i for i in step().issues if "usable board views" not in i and "carry usable" not in i
-            )
+            self.issues = step().issues
         except BadInputError as error:
             self.issues = (str(error),)
         return self.issues

@@ -42,13 +42,13 @@ Ambient = Annotated[
     typer.Option("--ambient-temperature-k", min=150, max=400, help="Temperature of the room [K]."),
 ]
 MinutesOn = Annotated[
-    float | None, typer.Option("--minutes-on", min=0, help="How long camera and projector have been on.")
+    float | None, typer.Option("--minutes-on", min=0, help="Minutes that the rig has been on (the lamp's).")
 ]
 Frames = Annotated[int, typer.Option(min=1, max=1000, help="Live: frames averaged into one picture.")]
-Settle = Annotated[float, typer.Option(min=0, max=60, help="Live: wait so many seconds after each pattern.")]
+Settle = Annotated[float, typer.Option(min=0, max=60, help="Live: wait so long after each pattern [s].")]
 Every = Annotated[
     float | None,
-    typer.Option(min=0.5, max=600, help="Live: take a picture every so many seconds, hands free."),
+    typer.Option(min=0.5, max=600, help="Live: take a picture so often [s], hands free."),
 ]
 Screen = Annotated[
     str, typer.Option(help="Live: kiosk (a page, opened on the projector), or a card such as /dev/dri/card0.")
@@ -56,6 +56,10 @@ Screen = Annotated[
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Live: port of the kiosk page.")]
 Retake = Annotated[
     list[str] | None, typer.Option(help="Live: forget this view first, such as view_03.png or place_02.")
+]
+
+Discard = Annotated[
+    bool, typer.Option("--discard", help="Only forget what this step has taken and not completed.")
 ]
 
 
@@ -79,7 +83,7 @@ def make_placement(
     anchor: str | None,
     camera_at: str | None,
     wall_y: float | None,
-    plumb: str | None,
+    plumb_px: str | None,
 ) -> Placement:
     """How the world lies, the wall's y from the experiment's room unless given. Raises BadInputError."""
     settings = folder.settings()
@@ -88,8 +92,8 @@ def make_placement(
     if anchor is not None and camera_at is not None:
         raise BadInputError("Give --anchor or --camera-at, not both: each fixes the world's x and z.")
     line = None
-    if plumb is not None:
-        a, b, c, d = numbers(plumb, 4, "--plumb", "640,900,642,120")
+    if plumb_px is not None:
+        a, b, c, d = numbers(plumb_px, 4, "--plumb-px", "640,900,642,120")
         line = (a, b, c, d)
     if anchor is not None:
         u, v, x, z = numbers(anchor, 4, "--anchor", "640,512,1.5,1.2")

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from app.calibrate.folder import CalibrationFolder
-from app.calibrate.guide import StepName
+from app.calibrate.folder import CalibrationFolder, StepName
 from app.experiment.folder import Experiment
 from calibration.bundle import Bundle, Quality
 from core.scene import ProjectedPattern

@@ -13,13 +13,13 @@ import cv2
 import numpy as np
 import tifffile
 
+from app.capture.burst import Watch, shoot
 from app.errors import AirlensError
-from app.files.disk_space import check_room
 from app.files.durable import write_durably
 from app.rig.stage import Stage
 from calibration.graycode import patterns
-from drivers.burst import BurstOutcome, CapturePlan
-from drivers.capture import Abort, Taken, run_capture
+from drivers.burst import Burst, BurstOutcome, CapturePlan, CaptureRole
+from drivers.capture import Abort, OnFrame, Taken
 from drivers.display import Picture
 from drivers.protocols import Frame
 
@@ -37,18 +37,19 @@ class Shooter:
         self, stage: Stage, frames: int, settle_s: float, progress: OnPicture, abort: Abort | None = None
     ) -> None:
         self._stage, self._frames, self._settle_s = stage, frames, settle_s
-        self._progress, self._abort = progress, abort
+        self._progress, self._abort = progress, abort or (lambda: False)
 
     def one(self, file: Path) -> Path:
         """Take one picture (the mean of `frames`) and return where it was kept. Raises StoppedError, DeviceError."""
         newest: list[Frame] = []
-        plan = CapturePlan(kind="flat", frames=self._frames, settle_s=self._settle_s)
-        check_room(_existing(file), plan, self._stage.camera.info)
-        burst = run_capture(
-            self._stage.camera, plan, on_frame=lambda taken: newest.append(taken.frame), abort=self._abort
-        )
+
+        def remember(taken: Taken) -> None:
+            newest[:] = [taken.frame]
+
+        plan = CapturePlan(role="flat", frames=self._frames, settle_s=self._settle_s)
+        burst = self._shoot(file.parent, plan, remember)
         _check(burst.outcome, file)
-        if len(newest) == 1:
+        if burst.frames == 1:
             return save(file, newest[0].pixels)
         return save(file.with_suffix(".tif"), burst.mean * np.float32(burst.full_scale_counts))
 
@@ -62,13 +63,14 @@ class Shooter:
 
     def burst(self, folder: Path, frames: int, *, dark: bool = False) -> float:
         """Keep every frame of a burst, for its noise; return their mean level, a part of full scale."""
-        plan = CapturePlan(kind="dark" if dark else "flat", frames=frames, settle_s=self._settle_s)
+        role: CaptureRole = "dark" if dark else "flat"
+        plan = CapturePlan(role=role, frames=frames, settle_s=self._settle_s, raw_stack=True)
 
         def keep(taken: Taken) -> None:
             save(folder / f"{taken.moments.frames - 1:02d}.png", taken.frame.pixels)
             self._progress(taken.moments.frames, frames)
 
-        burst = run_capture(self._stage.camera, plan, on_frame=keep, abort=self._abort)
+        burst = self._shoot(folder, plan, keep)
         _check(burst.outcome, folder)
         return float(burst.mean.mean())
 
@@ -77,6 +79,10 @@ class Shooter:
         if self._stage.display is not None:
             width_px, height_px = self._panel_px()
             self._show(np.full((height_px, width_px), level, np.uint8))
+
+    def _shoot(self, where: Path, plan: CapturePlan, on_frame: OnFrame) -> Burst:
+        watch = Watch(frame=on_frame, stop=lambda: "keep" if self._abort() else None)
+        return shoot(self._stage.camera, where, plan, watch)
 
     def _show(self, picture: Picture) -> None:
         display = self._stage.display
@@ -120,7 +126,3 @@ def _check(outcome: BurstOutcome, where: Path) -> None:
             f"The camera ended the burst early ({outcome.value}) at {where.name}. Check it, then run the same "
             "command again; the pictures before it are kept."
         )
-
-
-def _existing(file: Path) -> Path:
-    return next(p for p in file.parents if p.exists())

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
-from app.calibrate.folder import CalibrationFolder
-from app.calibrate.guide import GuidedCalibration, LivePlan, StepName
+from app.calibrate.folder import CalibrationFolder, StepName
+from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.calibrate.pictures import StoppedError
 from app.errors import AirlensError, BadInputError
 from app.experiment.folder import Experiment
@@ -88,6 +88,7 @@ class CalibrationDesk:
             guided = self._asked(experiment, plan)
             guided.skip()
             self._skipped[experiment.folder.name, plan.step] = guided.skipped
+            guided.finish()
         return guided.wanted()
 
     def retake(self, experiment: Experiment, plan: LivePlan, view: str) -> None:
@@ -96,6 +97,16 @@ class CalibrationDesk:
             self._free()
             self._asked(experiment, plan).retake(view)
             self._tell("calibration", {"experiment": experiment.folder.name, "state": "retake", "view": view})
+
+    def discard(self, experiment: Experiment, plan: LivePlan) -> None:
+        """Forget what a step has taken and not completed. Raises DeviceBusyError."""
+        with self._lock:
+            self._free()
+            name = experiment.folder.name
+            CalibrationFolder(experiment.folder).discard(plan.step, plan.camera)
+            self._skipped.pop((name, plan.step), None)
+            self._change(GuideStatus())
+            self._tell("calibration", {"experiment": name, "state": "discard", "step": plan.step.value})
 
     def stop(self) -> GuideStatus:
         """End what runs within a frame; what was taken is kept."""
@@ -137,7 +148,9 @@ class CalibrationDesk:
             guided = self._guided(experiment, plan, stage)
             guided.resume()
             issues = guided.take(self._progress, self._abort.is_set)
-        note_conditions(CalibrationFolder(experiment.folder), conditions_of(experiment.settings, told))
+            in_use = guided.finish()
+        if in_use:
+            note_conditions(CalibrationFolder(experiment.folder), conditions_of(experiment.settings, told))
         return issues
 
     @contextmanager

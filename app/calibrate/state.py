@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.calibrate.guide import StepName
+from app.calibrate.folder import StepName
 from app.calibrate.steps import model_of
 from calibration.advice import CELLS, advise, coverage
 from calibration.errors import CalibrationError

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from app.calibrate.folder import CalibrationFolder
+from app.calibrate.folder import CalibrationFolder, StepName
 from app.errors import BadInputError
 from app.files.image_folder import Sequence, find_images, read_grey, sequences
 from calibration.board import Board
-from calibration.errors import CalibrationError
+from calibration.errors import CalibrationError, TooFewViewsError
 from calibration.graycode import decode, frame_count
 from calibration.local import on_panel
 from calibration.model import Model, build
@@ -32,11 +32,16 @@ OnEvent = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Step:
-    """What a step came to: the models so far (none: not enough yet) and everything to retake."""
+    """What a step came to: the models so far (none: not enough yet), everything to retake, and what is missing.
 
+    `missing` says that more pictures are wanted; those that were taken are not at fault.
+    """
+
+    name: StepName
     model: Model | None
     record: Record
     issues: tuple[str, ...]
+    missing: str = ""
 
 
 @dataclass(frozen=True)
@@ -67,7 +72,7 @@ def calibrate_camera(
         issues += view.issues
         if view.usable:
             boards.append(((view.width_px, view.height_px), seen_board(view, digest(image))))
-    return _finish(calibration, camera, boards, issues, None)
+    return _added(calibration, StepName.camera, camera, boards, issues)
 
 
 def calibrate_projector(
@@ -92,7 +97,7 @@ def calibrate_projector(
         issues += found
         if seen is not None:
             boards.append((size, seen))
-    return _finish(calibration, camera, boards, issues, panel_px)
+    return _added(calibration, StepName.projector, camera, boards, issues, panel_px)
 
 
 def calibrate_wall(
@@ -104,7 +109,7 @@ def calibrate_wall(
     on_event: OnEvent,
 ) -> Step:
     """The wall from Gray code on it, or from a board held flat against it; the world's axes and origin."""
-    record = calibration.record(camera)
+    record = calibration.collected(camera)
     if record is None:
         raise BadInputError("There is no calibrated camera yet; run 'airlens calibrate camera' first.")
     record, issues = replace(record, placement=placement), []
@@ -131,18 +136,19 @@ def calibrate_wall(
         raise BadInputError(
             "Nothing shows the wall; give --images, a Gray-code sequence on it, or --level-image."
         )
-    return built(calibration, record, issues)
+    return built(calibration, StepName.wall, record, issues)
 
 
-def _finish(
+def _added(
     calibration: CalibrationFolder,
+    step: StepName,
     camera: str,
     boards: list[tuple[tuple[int, int], SeenBoard]],
     issues: list[str],
-    panel_px: tuple[int, int] | None,
+    panel_px: tuple[int, int] | None = None,
 ) -> Step:
     """Add the boards to the record and build; pictures of another size and repeated ones are named."""
-    old = calibration.record(camera)
+    old = calibration.collected(camera)
     if not boards and old is None:
         raise BadInputError("No picture shows the board. " + " ".join(issues[:5]))
     size = old.camera_size_px if old else Counter(s for s, _ in boards).most_common(1)[0][0]
@@ -159,7 +165,7 @@ def _finish(
             kept[board.sha256] = board
     record = old or Record(camera, size)
     record = _merged(record, tuple(kept.values()), panel_px)
-    return built(calibration, record, issues)
+    return built(calibration, step, record, issues)
 
 
 def _merged(record: Record, boards: tuple[SeenBoard, ...], panel_px: tuple[int, int] | None) -> Record:
@@ -175,18 +181,32 @@ def model_of(record: Record) -> Model:
     return build(record)
 
 
-def built(calibration: CalibrationFolder, record: Record, issues: list[str]) -> Step:
-    """Keep the record, and the models as far as it allows; too few views yet are an issue, not an error."""
-    calibration.save_record(record)
+def built(calibration: CalibrationFolder, step: StepName, record: Record, issues: list[str]) -> Step:
+    """Keep the record as that of a started step, and make its models as far as it allows."""
+    calibration.save_started(step, record)
+    return modelled(step, record, issues)
+
+
+def modelled(step: StepName, record: Record, issues: list[str]) -> Step:
+    """A step's models as far as its record allows; too few views yet are no issue."""
     try:
         model = model_of(record)
+    except TooFewViewsError as error:
+        return Step(step, None, record, tuple(issues), str(error))
     except CalibrationError as error:
-        return Step(None, record, (*issues, str(error)))
-    calibration.save_model(model)
-    lit = sum(bool(b.panel_px) for b in record.boards)
+        return Step(step, None, record, (*issues, str(error)))
+    missing = ""
     if record.panel_size_px is not None and model.pair is None:
-        issues.append(f"{lit} boards carry usable Gray code; expected at least 3. Take more sequences.")
-    return Step(model, record, tuple(issues))
+        lit = sum(bool(b.panel_px) for b in record.boards)
+        missing = f"{lit} boards carry usable Gray code; expected at least 3. Take more sequences."
+    return Step(step, model, record, tuple(issues), missing)
+
+
+def put_to_use(calibration: CalibrationFolder, step: Step) -> Step:
+    """Make a step's models those in use, if there are any."""
+    if step.model is not None:
+        calibration.put_to_use(step.model)
+    return step
 
 
 def _board_files(pictures: Pictures, files: list[Path]) -> list[Path]:

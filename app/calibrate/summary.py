@@ -16,7 +16,7 @@ def summary(step: Step, seconds: float) -> dict[str, Any]:
     found: dict[str, Any] = {
         "complete": step.model is not None,
         "boards": len(step.record.boards),
-        "issues": list(step.issues),
+        "issues": [*step.issues, *([step.missing] if step.missing else [])],
         "seconds": round(seconds, 2),
     }
     if step.model is None:

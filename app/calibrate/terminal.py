@@ -10,8 +10,8 @@ from pathlib import Path
 
 import typer
 
-from app.calibrate.folder import CalibrationFolder
-from app.calibrate.guide import GuidedCalibration, LivePlan, StepName
+from app.calibrate.folder import CalibrationFolder, StepName
+from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.calibrate.pictures import StoppedError
 from app.calibrate.state import line_of
 from app.errors import BadInputError
@@ -49,6 +49,7 @@ def run_live(folder: Path, plan: LivePlan, options: LiveOptions) -> None:
             for name in options.retake:
                 guided.retake(name)
             _session(guided, plan.step, _Prompt(stage.arranges_itself, options.every_s, stopped), stopped)
+            guided.finish()
 
 
 def _session(

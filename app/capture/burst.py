@@ -1,24 +1,60 @@
-"""Bursts of an open camera into an experiment's folder: one, or a sequence; kept or discarded."""
+"""One burst of an open camera, taken and kept: the same few lines whoever asks.
+
+The command line, the service and `simulate` call `take` (or `take_order`, for a sequence): disk space, id,
+record, run, judge, origin, keep. A calibration takes its pictures with `shoot`, which is the burst alone.
+"""
 
 import contextlib
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from app.capture.checks import judged, noted
+from app.capture.checks import judged
 from app.experiment.captures import CaptureRecorder
 from app.experiment.folder import Experiment, new_id
 from app.files.disk_space import check_room
-from app.rig.conditions import UNTOLD, Conditions, seconds_on
+from app.rig.conditions import UNTOLD, Conditions, conditions_of, known_pairs, seconds_on
+from app.rig.open import air_of
 from drivers.burst import Burst, BurstOutcome, CapturePlan
-from drivers.capture import Abort, OnProgress, run_capture
+from drivers.capture import Abort, OnFrame, OnProgress, Taken, run_capture
+from drivers.errors import DeviceSettingError
 from drivers.protocols import Camera
-from drivers.sequence import BurstStart, check_times, run_sequence
+from drivers.sequence import BurstStart, check_times, evenly, run_sequence
 
 OnAbort = Literal["keep", "discard"]
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is asked for: a burst, or several `every_s` from start to start; and what the operator states."""
+
+    plan: CapturePlan
+    bursts: int = 1
+    every_s: float = 0.0
+    told: Conditions = UNTOLD
+
+    def __post_init__(self) -> None:
+        if self.bursts < 1 or (self.bursts > 1 and not self.every_s > 0):
+            raise DeviceSettingError(
+                f"bursts is {self.bursts} and every_s is {self.every_s:g}; expected one burst, or several with "
+                "the time from start to start."
+            )
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Who follows a burst: hears of every frame, and ends it by saying what becomes of the frames so far.
+
+    `begun` hears of the folder of every new capture.
+    """
+
+    progress: OnProgress | None = None
+    frame: OnFrame | None = None
+    stop: Callable[[], OnAbort | None] = lambda: None
+    begun: Callable[[Path], object] = lambda folder: None
 
 
 @dataclass(frozen=True)
@@ -28,55 +64,112 @@ class TakenBurst:
     burst: Burst
     folder: Path | None
 
+    @property
+    def shortfall(self) -> str:
+        """Why this is not what was asked for, and what to do; empty when it is."""
+        if self.burst.outcome is BurstOutcome.COMPLETE:
+            return ""
+        kept = "They were discarded, as asked."
+        if self.folder is not None:
+            kept = f"They are kept in {self.folder.name}, marked as incomplete."
+        return (
+            f"The {self.burst.plan.role} capture ended early ({self.burst.outcome.value}) after "
+            f"{self.burst.frames} of {self.burst.plan.frames} frames. {kept} Take it again."
+        )
+
+
+_UNWATCHED = Watch()
+
 
 def take(
     camera: Camera,
     experiment: Experiment,
     plan: CapturePlan,
-    on_progress: OnProgress | None = None,
-    *,
-    abort: Abort | None = None,
-    on_abort: OnAbort = "keep",
     told: Conditions = UNTOLD,
-    start: BurstStart | None = None,
+    watch: Watch = _UNWATCHED,
+    *,
+    sequence: dict[str, Any] | None = None,
+    name: str | None = None,
 ) -> TakenBurst:
-    """Take one burst into a new capture folder. Raises AirlensError without room for it, DeviceError."""
-    rig_on_s = seconds_on(experiment.settings, told)
+    """Take one burst into a new folder below captures/, by `name` where that was given out already.
+
+    `sequence` says which burst of how many it is. Raises AirlensError without room for it, DeviceError.
+    """
     check_room(experiment.folder, plan, camera.info)
-    folder = experiment.captures_folder / new_id(experiment.captures_folder, plan.kind)
-    recorder = CaptureRecorder(folder, plan)
-    burst = run_capture(camera, plan, on_progress, on_frame=recorder.observe, abort=abort, rig_on_s=rig_on_s)
-    if burst.outcome is BurstOutcome.ABORTED and on_abort == "discard":
-        recorder.discard()
-        return TakenBurst(burst, None)
-    burst = judged(experiment, burst, told)
-    origin = {"rig": experiment.settings.rig.camera_kind} | noted(experiment, told)
-    origin |= {"sequence": asdict(start)} if start else {}
-    return TakenBurst(burst, recorder.keep(burst, origin))
+    name = name or new_id(experiment.captures_folder, plan.role)
+    recorder = CaptureRecorder(experiment.captures_folder / name, plan)
+    watch.begun(recorder.folder)
+    try:
+        burst = _run(camera, plan, watch, recorder.observe, seconds_on(experiment.settings, told))
+        if burst.outcome is BurstOutcome.ABORTED and watch.stop() == "discard":
+            recorder.discard()
+            return TakenBurst(burst, None)
+        burst = judged(experiment, burst, told)
+        return TakenBurst(burst, recorder.keep(burst, _origin(experiment, plan, told, sequence)))
+    except BaseException:
+        recorder.leave()
+        raise
 
 
-def take_sequence(
+def take_order(
     camera: Camera,
     experiment: Experiment,
-    plan: CapturePlan,
-    starts_s: Sequence[float],
-    on_progress: OnProgress | None = None,
-    *,
-    abort: Abort | None = None,
-    on_abort: OnAbort = "keep",
-    told: Conditions = UNTOLD,
+    order: Order,
+    watch: Watch = _UNWATCHED,
+    name: str | None = None,
 ) -> list[TakenBurst]:
-    """Take a burst at each of the times. Raises DeviceSettingError for times that cannot be kept."""
-    check_times(starts_s, plan.frames / camera.info.frame_rate_hz)
+    """Take every burst of an order, the first by `name`; fewer when it is stopped.
+
+    Raises DeviceSettingError for times that cannot be kept.
+    """
+    starts_s = evenly(order.bursts, order.every_s)
+    check_times(starts_s, order.plan.frames / camera.info.frame_rate_hz)
     taken: list[TakenBurst] = []
 
     def one(start: BurstStart) -> Burst:
-        options = {"abort": abort, "on_abort": on_abort, "told": told, "start": start}
-        taken.append(take(camera, experiment, plan, on_progress, **options))
+        sequence = None
+        if order.bursts > 1:
+            sequence = asdict(start) | {"bursts": order.bursts, "every_s": order.every_s}
+        own = name if start.number == 0 else None
+        taken.append(take(camera, experiment, order.plan, order.told, watch, sequence=sequence, name=own))
         return taken[-1].burst
 
-    run_sequence(starts_s, one, abort=abort)
+    run_sequence(starts_s, one, abort=lambda: watch.stop() is not None)
     return taken
+
+
+def shoot(camera: Camera, where: Path, plan: CapturePlan, watch: Watch = _UNWATCHED) -> Burst:
+    """Take a burst that becomes no capture. Raises AirlensError without room for it at `where`, DeviceError."""
+    check_room(where, plan, camera.info)
+    return _run(camera, plan, watch, lambda taken: None, None)
+
+
+def _run(camera: Camera, plan: CapturePlan, watch: Watch, keep: OnFrame, rig_on_s: float | None) -> Burst:
+    def follow(taken: Taken) -> None:
+        keep(taken)
+        if watch.frame is not None:
+            watch.frame(taken)
+
+    return run_capture(
+        camera,
+        plan,
+        watch.progress,
+        on_frame=follow,
+        abort=lambda: watch.stop() is not None,
+        rig_on_s=rig_on_s,
+    )
+
+
+def _origin(
+    experiment: Experiment, plan: CapturePlan, told: Conditions, sequence: dict[str, Any] | None
+) -> dict[str, Any]:
+    """Where the burst comes from: the rig, what a simulated room did, and the conditions as they are known."""
+    kind = experiment.settings.rig.camera_kind
+    origin: dict[str, Any] = {"rig": kind}
+    if kind == "simulated":
+        origin["air"] = air_of(plan.role)
+    origin |= known_pairs(conditions_of(experiment.settings, told))
+    return origin | ({} if sequence is None else {"sequence": sequence})
 
 
 @contextlib.contextmanager

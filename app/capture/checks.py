@@ -1,25 +1,28 @@
 """What a burst's own frames cannot tell: is it fit for this experiment's calibration and reference?
 
-Adds verdicts to those of the burst: the calibration's age and conditions, and for a flow how far the still
-border moved since the reference.
+Adds verdicts to those of the burst: the calibration's age and conditions, and for a flow whether its
+settings are the reference's and how far the still border moved since.
 """
 
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any
+
+import numpy as np
 
 from app.errors import AirlensError
 from app.experiment.calibration import read_bundle
-from app.experiment.captures import CapturePair, load_capture
+from app.experiment.captures import Capture, CapturePair, load_capture
 from app.experiment.folder import Experiment
-from app.rig.conditions import UNTOLD, Conditions, conditions_of
-from calibration.handover import warnings_for
+from app.rig.conditions import UNTOLD, Conditions, conditions_in, conditions_of
+from calibration.age import warnings_for
 from drivers.burst import Burst
 from drivers.quick_look import quick_look
 from drivers.verdict import Verdict
 
 # Beyond this the drift that the reconstruction takes out leaves traces of the pattern's own structure.
 MAX_DRIFT_PX = 1.0
+# As near as a camera grants what is asked of it.
+MAX_SETTING_OFF = 0.01
 
 
 def judged(experiment: Experiment, burst: Burst, told: Conditions = UNTOLD) -> Burst:
@@ -27,15 +30,9 @@ def judged(experiment: Experiment, burst: Burst, told: Conditions = UNTOLD) -> B
     if burst.frames == 0:
         return burst
     return replace(
-        burst, verdicts=(*burst.verdicts, *_calibration(experiment, told), *_drift(experiment, burst))
+        burst,
+        verdicts=(*burst.verdicts, *_calibration(experiment, told), *_against_reference(experiment, burst)),
     )
-
-
-def noted(experiment: Experiment, told: Conditions) -> dict[str, Any]:
-    """The conditions as they go into a capture's manifest; absent where nobody knows."""
-    known = conditions_of(experiment.settings, told)
-    pairs = {"ambient_temperature_k": known.ambient_temperature_k, "minutes_on": known.minutes_on}
-    return {name: value for name, value in pairs.items() if value is not None}
 
 
 def calibration_warnings(experiment: Experiment, captured: str, told: Conditions) -> tuple[str, ...]:
@@ -54,9 +51,8 @@ def aged(experiment: Experiment, captures: CapturePair) -> tuple[str, ...]:
     """Why these captures may not fit the calibration, by what their manifests noted."""
     found: dict[str, None] = {}
     for capture in (captures.reference, captures.flow):
-        origin = capture.manifest.get("origin", {})
-        told = Conditions(origin.get("ambient_temperature_k"), origin.get("minutes_on"))
-        for text in calibration_warnings(experiment, capture.manifest["created"], told):
+        known = conditions_in(capture.manifest.get("origin", {}))
+        for text in calibration_warnings(experiment, capture.manifest["created"], known):
             found[f"The {capture.role} capture: {text}"] = None
     return tuple(found)
 
@@ -68,14 +64,40 @@ def _calibration(experiment: Experiment, told: Conditions) -> list[Verdict]:
     return [Verdict("calibration", False, float(len(found)), expected, text) for text in found]
 
 
-def _drift(experiment: Experiment, burst: Burst) -> list[Verdict]:
-    """How far the border moved since the newest reference, if this is a flow and there is one."""
-    if burst.plan.kind != "flow":
+def _against_reference(experiment: Experiment, burst: Burst) -> list[Verdict]:
+    """What a flow must share with the newest reference, if there is one: its settings, and a still border."""
+    if burst.plan.role != "flow":
         return []
     try:
-        reference = load_capture(experiment.latest_capture("reference")).images[0].mean
+        reference = load_capture(experiment.latest_capture("reference"))
     except AirlensError:
         return []
+    return [*_settings(reference, burst), *_drift(reference.images[0].mean, burst)]
+
+
+def _settings(reference: Capture, burst: Burst) -> list[Verdict]:
+    """Exposure and gain as the reference had them; how much they differ, as a part of the reference's."""
+    before = {one["name"]: one["granted"] for one in reference.manifest["views"][0]["settings"]}
+    found = []
+    for one in burst.settings:
+        was = before.get(one.name)
+        if was is None or one.granted is None:
+            continue
+        off = abs(one.granted - was) / max(abs(was), 1e-9)
+        found.append(
+            Verdict(
+                f"{one.name} of the reference",
+                off <= MAX_SETTING_OFF,
+                off,
+                f"{was:g} as in the reference",
+                f"It was {one.granted:g}. Take both with the same setting: another one changes the picture.",
+            )
+        )
+    return found
+
+
+def _drift(reference: np.ndarray, burst: Burst) -> list[Verdict]:
+    """How far the border moved since the reference."""
     if reference.shape != burst.mean.shape:
         return []
     columns, rows = quick_look(reference, burst.mean).drift_px

@@ -9,20 +9,16 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
-from app.capture.checks import judged, noted
+from app.capture.burst import OnAbort, Order, TakenBurst, Watch, take_order
 from app.errors import AirlensError
-from app.experiment.captures import CaptureRecorder
 from app.experiment.folder import Experiment, new_id
-from app.files.disk_space import check_room
-from app.rig.conditions import UNTOLD, seconds_on
 from app.rig.live_camera import LiveCamera
-from app.rig.open import AirState, open_camera
-from drivers.burst import BurstOutcome, CapturePlan, Progress
-from drivers.capture import Taken, run_capture
+from app.rig.open import AirState, air_of, open_camera
+from drivers.burst import BurstOutcome, Progress
 from drivers.errors import DeviceBusyError, DeviceError
-from drivers.protocols import Camera
 
 TOLD_EVERY_S = 1.0
 
@@ -48,14 +44,16 @@ OUTCOMES = {
 
 @dataclass(frozen=True)
 class DeskStatus:
-    """The capture that runs, or the last one."""
+    """The capture that runs, or the last one: `done` of `total` frames, the how manieth of `bursts`."""
 
     state: DeskState = DeskState.idle
     experiment: str | None = None
     capture: str | None = None
     role: str | None = None
-    done: int = 0
     total: int = 0
+    bursts: int = 1
+    burst: int = 1
+    done: int = 0
     refused: int = 0
     level: float = 0.0
     reason: str = ""
@@ -68,8 +66,7 @@ class CaptureDesk:
         self._live = live
         self._tell = tell
         self._status = DeskStatus()
-        self._abort = threading.Event()
-        self._discard = False
+        self._stop: OnAbort | None = None
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._told_s = 0.0
@@ -79,26 +76,26 @@ class CaptureDesk:
         """The present state."""
         return self._status
 
-    def start(self, experiment: Experiment, plan: CapturePlan) -> DeskStatus:
+    def start(self, experiment: Experiment, order: Order) -> DeskStatus:
         """Begin a capture and return at once. Raises DeviceBusyError while another one runs."""
         with self._lock:
             if self._status.state is DeskState.running:
                 raise DeviceBusyError("A capture is running. Wait for its end, or abort it.")
-            self._abort.clear()
-            self._discard = False
-            name = new_id(experiment.captures_folder, plan.kind)
-            status = DeskStatus(DeskState.running, experiment.folder.name, name, plan.kind, total=plan.frames)
+            self._stop = None
+            plan = order.plan
+            name = new_id(experiment.captures_folder, plan.role)
+            folder = experiment.folder.name
+            status = DeskStatus(DeskState.running, folder, name, plan.role, plan.frames, order.bursts)
             self._change(status)
             self._thread = threading.Thread(
-                target=self._run, args=(experiment, plan, name), name="capture", daemon=True
+                target=self._run, args=(experiment, order, name), name="capture", daemon=True
             )
             self._thread.start()
             return status
 
     def abort(self, discard: bool) -> DeskStatus:
         """End the running capture within a frame; `discard` removes what was taken."""
-        self._discard = discard
-        self._abort.set()
+        self._stop = "discard" if discard else "keep"
         if self._thread is not None:
             self._thread.join(timeout=10)
         return self._status
@@ -107,15 +104,18 @@ class CaptureDesk:
         """Abort and keep."""
         self.abort(discard=False)
 
-    def _run(self, experiment: Experiment, plan: CapturePlan, name: str) -> None:
+    def _run(self, experiment: Experiment, order: Order, name: str) -> None:
+        watch = Watch(
+            self._progress, lambda taken: self._live.show(taken.frame), lambda: self._stop, self._begun
+        )
         try:
-            self._connect(experiment, "moving" if plan.kind == "flow" else "still")
+            self._connect(experiment, air_of(order.plan.role))
             with self._live.using() as camera:
-                check_room(experiment.folder, plan, camera.info)
-                state, reason = self._take(camera, experiment, name, plan)
+                taken = take_order(camera, experiment, order, watch, name)
         except (AirlensError, DeviceError, OSError) as error:
             self._change(replace(self._status, state=DeskState.failed, reason=str(error)))
             return
+        state, reason = _ending(order, taken)
         self._change(replace(self._status, state=state, reason=reason))
 
     def _connect(self, experiment: Experiment, air: AirState) -> None:
@@ -129,37 +129,10 @@ class CaptureDesk:
         ):
             self._live.open(source, lambda: open_camera(experiment, air), air)
 
-    def _take(
-        self, camera: Camera, experiment: Experiment, name: str, plan: CapturePlan
-    ) -> tuple[DeskState, str]:
-        recorder = CaptureRecorder(experiment.captures_folder / name, plan)
-
-        def follow(taken: Taken) -> None:
-            recorder.observe(taken)
-            self._live.show(taken.frame)
-
-        try:
-            burst = run_capture(
-                camera,
-                plan,
-                self._progress,
-                on_frame=follow,
-                abort=self._abort.is_set,
-                rig_on_s=seconds_on(experiment.settings, UNTOLD),
-            )
-        except BaseException:
-            recorder.discard()
-            raise
-        if self._abort.is_set() and self._discard:
-            recorder.discard()
-            return DeskState.aborted, "Discarded, as asked."
-        recorder.keep(judged(experiment, burst), origin={"taken_by": "service"} | noted(experiment, UNTOLD))
-        if burst.outcome is BurstOutcome.COMPLETE:
-            return DeskState.finished, ""
-        kept = f"{burst.frames} of {plan.frames} frames are kept as an incomplete capture."
-        return OUTCOMES[
-            burst.outcome
-        ], f"The burst ended early ({burst.outcome.value}); {kept} Take it again."
+    def _begun(self, folder: Path) -> None:
+        now = self._status
+        burst = now.burst + (folder.name != now.capture)
+        self._change(replace(now, capture=folder.name, burst=burst, done=0, refused=0))
 
     def _progress(self, progress: Progress) -> None:
         status = replace(
@@ -177,5 +150,15 @@ class CaptureDesk:
     def _change(self, status: DeskStatus) -> None:
         self._status = status
         self._told_s = time.monotonic()
-        names = ("experiment", "capture", "role", "done", "total", "reason")
+        names = ("experiment", "capture", "role", "burst", "bursts", "done", "total", "reason")
         self._tell("capture", {"state": status.state.value} | {name: getattr(status, name) for name in names})
+
+
+def _ending(order: Order, taken: list[TakenBurst]) -> tuple[DeskState, str]:
+    """How an order ended, by its last burst."""
+    if not taken:
+        return DeskState.aborted, "Stopped before the first burst; nothing was taken."
+    last = taken[-1]
+    if last.shortfall or len(taken) == order.bursts:
+        return OUTCOMES[last.burst.outcome], last.shortfall
+    return DeskState.aborted, f"Stopped after {len(taken)} of {order.bursts} bursts; they are kept."

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from app.calibrate.folder import CalibrationFolder
-from app.calibrate.guide import LivePlan, StepName
+from app.calibrate.folder import CalibrationFolder, StepName
+from app.calibrate.guide import LivePlan
 from app.calibrate.options import (
     Ambient,
     AsJson,
@@ -18,6 +18,7 @@ from app.calibrate.options import (
     BoardKind,
     CameraName,
     Dictionary,
+    Discard,
     Every,
     Folder,
     Frames,
@@ -42,7 +43,15 @@ from app.calibrate.options import (
 )
 from app.calibrate.page import write_page
 from app.calibrate.response import calibrate_response, drift_between
-from app.calibrate.steps import Pictures, Step, built, calibrate_camera, calibrate_projector, calibrate_wall
+from app.calibrate.steps import (
+    Pictures,
+    Step,
+    calibrate_camera,
+    calibrate_projector,
+    calibrate_wall,
+    modelled,
+    put_to_use,
+)
 from app.calibrate.summary import lines, summary
 from app.calibrate.terminal import LiveOptions, run_live
 from app.errors import AirlensError, BadInputError
@@ -78,20 +87,29 @@ def camera(
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
     frames: Frames = 1,
-    every: Every = None,
+    every_s: Every = None,
     retake: Retake = None,
+    discard: Discard = False,
     as_json: AsJson = False,
 ) -> None:
     """Fit the camera to views of a board: live, or in pictures (of a Gray-code sequence, its white frame)."""
     folder = CalibrationFolder(experiment)
+    if discard:
+        folder.discard(StepName.camera, camera)
+        return
     target = needed_board(chosen_board(folder, board, grid, square, marker, dictionary))
     known = told(ambient_temperature_k, minutes_on)
     if images is None:
         plan = LivePlan(StepName.camera, camera, target, frames)
-        live(folder, plan, LiveOptions(every, retake=tuple(retake or ())), known, as_json)
+        live(folder, plan, LiveOptions(every_s, retake=tuple(retake or ())), known, as_json)
         return
     pictures = Pictures(images, pattern, full_scale(bits))
-    run(lambda say: calibrate_camera(folder, camera, pictures, target, say), folder, known, as_json)
+    run(
+        lambda say: put_to_use(folder, calibrate_camera(folder, camera, pictures, target, say)),
+        folder,
+        known,
+        as_json,
+    )
 
 
 def projector(
@@ -112,24 +130,33 @@ def projector(
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
     frames: Frames = 1,
-    settle: Settle = 0.2,
-    every: Every = None,
+    settle_s: Settle = 0.2,
+    every_s: Every = None,
     screen: Screen = "kiosk",
     port: Port = 8766,
     retake: Retake = None,
+    discard: Discard = False,
     as_json: AsJson = False,
 ) -> None:
     """Fit camera and projector to Gray-code sequences on a board, one sequence for each place of it."""
     folder = CalibrationFolder(experiment)
+    if discard:
+        folder.discard(StepName.projector, camera)
+        return
     target = needed_board(chosen_board(folder, board, grid, square, marker, dictionary))
     known = told(ambient_temperature_k, minutes_on)
     if images is None:
-        plan = LivePlan(StepName.projector, camera, target, frames, settle_s=settle)
-        live(folder, plan, LiveOptions(every, screen, port, tuple(retake or ())), known, as_json)
+        plan = LivePlan(StepName.projector, camera, target, frames, settle_s=settle_s)
+        live(folder, plan, LiveOptions(every_s, screen, port, tuple(retake or ())), known, as_json)
         return
     pictures = Pictures(images, pattern, full_scale(bits), white_first)
     panel = panel_size(folder, projector_px)
-    run(lambda say: calibrate_projector(folder, camera, pictures, target, panel, say), folder, known, as_json)
+    run(
+        lambda say: put_to_use(folder, calibrate_projector(folder, camera, pictures, target, panel, say)),
+        folder,
+        known,
+        as_json,
+    )
 
 
 def wall(
@@ -151,7 +178,7 @@ def wall(
         str | None, typer.Option(help="World X,Z [m] of the camera: X,Z (the scene's).")
     ] = None,
     wall_y: Annotated[float | None, typer.Option(help="World y of the wall [m] (the scene's).")] = None,
-    plumb: Annotated[
+    plumb_px: Annotated[
         str | None, typer.Option(help="Lower and upper end of a vertical line on the wall: U,V,U,V.")
     ] = None,
     camera: CameraName = "camera",
@@ -159,24 +186,33 @@ def wall(
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
     frames: Frames = 1,
-    settle: Settle = 0.2,
-    every: Every = None,
+    settle_s: Settle = 0.2,
+    every_s: Every = None,
     screen: Screen = "kiosk",
     port: Port = 8766,
+    discard: Discard = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the back wall and place camera and projector in the room: live, or from --images, --level-image."""
     folder = CalibrationFolder(experiment)
+    if discard:
+        folder.discard(StepName.wall, camera)
+        return
     target = chosen_board(folder, board, grid, square, marker, dictionary)
-    placement = make_placement(folder, anchor, camera_at, wall_y, plumb)
+    placement = make_placement(folder, anchor, camera_at, wall_y, plumb_px)
     known = told(ambient_temperature_k, minutes_on)
     if images is None and level_image is None:
-        plan = LivePlan(StepName.wall, camera, target, frames, settle_s=settle, placement=placement)
-        live(folder, plan, LiveOptions(every, screen, port), known, as_json)
+        plan = LivePlan(StepName.wall, camera, target, frames, settle_s=settle_s, placement=placement)
+        live(folder, plan, LiveOptions(every_s, screen, port), known, as_json)
         return
     level = None if level_image is None else (level_image, needed_board(target))
     pictures = None if images is None else Pictures(images, pattern, full_scale(bits))
-    run(lambda say: calibrate_wall(folder, camera, pictures, level, placement, say), folder, known, as_json)
+    run(
+        lambda say: put_to_use(folder, calibrate_wall(folder, camera, pictures, level, placement, say)),
+        folder,
+        known,
+        as_json,
+    )
 
 
 def response(
@@ -188,19 +224,23 @@ def response(
     camera: CameraName = "camera",
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
-    frames: Annotated[int, typer.Option(min=2, max=1000, help="Live: frames a burst.")] = 16,
-    settle: Settle = 0.2,
-    every: Every = None,
+    response_frames: Annotated[int, typer.Option(min=2, max=1000, help="Live: frames a burst.")] = 16,
+    settle_s: Settle = 0.2,
+    every_s: Every = None,
     screen: Screen = "kiosk",
     port: Port = 8766,
+    discard: Discard = False,
     as_json: AsJson = False,
 ) -> None:
     """Measure dark level, gain, read noise, linearity, the projector's curve and the flat field."""
     folder = CalibrationFolder(experiment)
+    if discard:
+        folder.discard(StepName.response, camera)
+        return
     known = told(ambient_temperature_k, minutes_on)
     if images is None:
-        plan = LivePlan(StepName.response, camera, None, response_frames=frames, settle_s=settle)
-        run_live(experiment, plan, LiveOptions(every, screen, port))
+        plan = LivePlan(StepName.response, camera, None, response_frames=response_frames, settle_s=settle_s)
+        run_live(experiment, plan, LiveOptions(every_s, screen, port))
         note_conditions(folder, conditions_of(folder.settings(), known))
         bundle = folder.bundle()
     else:
@@ -281,12 +321,19 @@ def live(
 
     def step(say: Callable[[str], None]) -> Step:
         run_live(folder.experiment, plan, options)
-        record = folder.record(plan.camera)
+        record = folder.collected(plan.camera)
         if record is None:
             raise AirlensError("No view shows the board yet. Run the command again; it goes on from here.")
-        return built(folder, record, [])
+        return modelled(plan.step, record, [])
 
     run(step, folder, known, as_json)
+
+
+def from_pictures(
+    step: Callable[[Callable[[str], None]], Step], folder: CalibrationFolder, known: Conditions, as_json: bool
+) -> None:
+    """Do a step on pictures that are there; what they suffice for is in use at once."""
+    run(lambda say: put_to_use(folder, step(say)), folder, known, as_json)
 
 
 def run(
@@ -306,10 +353,13 @@ def run(
         done = step(say)
     except CalibrationError as error:
         raise BadInputError(str(error)) from error
-    note_conditions(folder, known)
+    started = folder.started(done.record.camera)
+    if started is None:
+        note_conditions(folder, known)
     content: dict[str, Any] = summary(done, time.perf_counter() - began)
     typer.echo(json.dumps(content, indent=1) if as_json else "\n".join(lines(content)))
-    if done.model is None:
+    if started is not None:
         raise AirlensError(
-            "The calibration is not complete. What was found is kept; add the pictures named above."
+            f"The step '{started}' is not complete; the calibration in use is as it was. What was found is "
+            "kept: add the pictures that are still wanted, or forget them with --discard."
         )

@@ -2,16 +2,17 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 from rich.progress import Progress as Bar
 
 from app.errors import AirlensError
-from drivers.burst import CaptureKind
+from drivers.burst import CaptureRole
 
 Folder = Annotated[Path, typer.Argument(help="Experiment folder, whose rig names the camera.")]
-_KINDS: dict[CaptureKind, str] = {
+OnAbort = Literal["keep", "discard"]
+_ROLES: dict[CaptureRole, str] = {
     "reference": "Take the reference: still air.",
     "flow": "Take the flow image, or a sequence of them.",
     "dark": "Take dark frames: lens covered.",
@@ -21,85 +22,78 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
 def register(cli: typer.Typer) -> None:
-    """Add `capture` with one command for each kind of burst."""
+    """Add `capture` with one command for each role."""
     group = typer.Typer(no_args_is_help=True, help="Take bursts with the rig, or watch the shift live.")
-    for kind, text in _KINDS.items():
-        group.command(kind, help=text)(_command(kind))
+    for role, text in _ROLES.items():
+        group.command(role, help=text)(_command(role))
     group.command()(watch)
     cli.add_typer(group, name="capture")
 
 
-def _command(kind: CaptureKind):
+def _command(role: CaptureRole):
     def command(
         experiment: Folder,
         frames: Annotated[int, typer.Option(min=1, help="Frames in the mean.")] = 100,
-        exposure: Annotated[float | None, typer.Option(help="Exposure time in s.")] = None,
-        gain: Annotated[float | None, typer.Option(help="Gain in the camera's own unit.")] = None,
-        settle: Annotated[float, typer.Option(min=0.0, help="Wait so many seconds first.")] = 0.0,
-        refresh_hz: Annotated[float | None, typer.Option(help="Projector's refresh rate in Hz.")] = None,
-        rig_on: Annotated[float | None, typer.Option(help="How long the rig has been on, in s.")] = None,
+        exposure_s: Annotated[float | None, typer.Option(help="Exposure time [s] of this capture.")] = None,
+        gain: Annotated[
+            float | None, typer.Option(help="Gain of this capture, in the camera's unit.")
+        ] = None,
+        settle_s: Annotated[float, typer.Option(min=0.0, help="Wait so long first [s].")] = 0.0,
+        settle_frames: Annotated[
+            int, typer.Option(min=0, help="Discard up to so many until two are equally bright.")
+        ] = 30,
+        max_refused: Annotated[int, typer.Option(min=0, help="Give up after so many bad frames.")] = 100,
+        refresh_hz: Annotated[float | None, typer.Option(help="Projector's refresh rate [Hz].")] = None,
+        raw_stack: Annotated[
+            bool, typer.Option("--raw-stack", help="Keep every frame in frames.tif.")
+        ] = False,
+        bursts: Annotated[int, typer.Option(min=1, help="Bursts in a sequence.")] = 1,
+        every_s: Annotated[float, typer.Option(min=0.0, help="From start to start of its bursts [s].")] = 0.0,
         ambient_temperature_k: Annotated[
             float | None, typer.Option(min=150, max=400, help="Temperature of the room [K] (the scene's).")
         ] = None,
-        raw: Annotated[bool, typer.Option("--raw", help="Keep every frame in frames.tif.")] = False,
-        bursts: Annotated[int, typer.Option(min=1, help="Bursts in a sequence.")] = 1,
-        every: Annotated[float, typer.Option(min=0.0, help="From start to start, in s.")] = 0.0,
-        on_abort: Annotated[str, typer.Option(help="After Ctrl-C: keep or discard.")] = "keep",
+        minutes_on: Annotated[
+            float | None, typer.Option(min=0, help="Minutes that the rig has been on (the lamp's).")
+        ] = None,
+        on_abort: Annotated[OnAbort, typer.Option(help="After Ctrl-C: the frames so far.")] = "keep",
         as_json: AsJson = False,
     ) -> None:
-        from app.errors import BadInputError
+        from app.capture.burst import Order
         from app.rig.conditions import Conditions
         from drivers.burst import CapturePlan
 
-        if on_abort not in ("keep", "discard"):
-            raise BadInputError(f"--on-abort {on_abort!r} is not known; give keep or discard.")
         plan = CapturePlan(
-            kind=kind,
-            frames=frames,
-            exposure_s=exposure,
-            gain=gain,
-            settle_s=settle,
-            refresh_hz=refresh_hz,
-            raw_stack=raw,
+            role, frames, exposure_s, gain, settle_s, settle_frames, max_refused, refresh_hz, raw_stack
         )
-        told = Conditions(ambient_temperature_k, None if rig_on is None else rig_on / 60)
-        _take(experiment, plan, bursts, every, "keep" if on_abort == "keep" else "discard", told, as_json)
+        told = Conditions(ambient_temperature_k, minutes_on)
+        _take(experiment, Order(plan, bursts, every_s, told), on_abort, as_json)
 
     return command
 
 
-def _take(folder: Path, plan, bursts: int, every_s: float, on_abort, told, as_json: bool) -> None:
-    from app.capture.burst import interruptible, take, take_sequence
+def _take(folder: Path, order, on_abort: OnAbort, as_json: bool) -> None:
+    from app.capture.burst import Watch, interruptible, take_order
     from app.experiment.folder import open_experiment
-    from app.rig.open import open_camera
-    from drivers.sequence import evenly
+    from app.rig.open import air_of, open_camera
 
-    experiment = open_experiment(folder)
+    experiment, plan = open_experiment(folder), order.plan
     with (
-        open_camera(experiment, "moving" if plan.kind == "flow" else "still") as camera,
-        interruptible() as abort,
+        open_camera(experiment, air_of(plan.role)) as camera,
+        interruptible() as stopped,
         Bar(transient=True) as bar,
     ):
-        task = bar.add_task(f"{plan.kind} burst", total=plan.frames)
-
-        def progress(now) -> None:
-            bar.update(task, completed=now.done)
-
-        if bursts == 1:
-            options = {"abort": abort, "on_abort": on_abort, "told": told}
-            taken = [take(camera, experiment, plan, progress, **options)]
-        else:
-            starts = evenly(bursts, every_s)
-            options = {"abort": abort, "on_abort": on_abort, "told": told}
-            taken = take_sequence(camera, experiment, plan, starts, progress, **options)
+        task = bar.add_task(f"{plan.role} burst", total=plan.frames)
+        watch = Watch(
+            progress=lambda now: bar.update(task, completed=now.done),
+            stop=lambda: on_abort if stopped() else None,
+        )
+        taken = take_order(camera, experiment, order, watch)
     for one in taken:
         typer.echo(json.dumps(_summary(one)) if as_json else _text(one))
-    cut = [one for one in taken if one.burst.outcome != "complete"]
-    if cut or len(taken) < bursts:
-        raise AirlensError(
-            f"The capture ended early ({cut[0].burst.outcome if cut else 'aborted'}); "
-            "what was taken is as said above. Take it again."
-        )
+    if not taken or taken[-1].shortfall:
+        raise AirlensError(taken[-1].shortfall if taken else "Stopped before the first burst.")
+    if len(taken) < order.bursts:
+        raise AirlensError(f"Stopped after {len(taken)} of {order.bursts} bursts; they are kept.")
 
 
 def _summary(one) -> dict[str, Any]:
@@ -127,7 +121,7 @@ def _text(one) -> str:
 def watch(
     experiment: Folder,
     count: Annotated[int, typer.Option(min=0, help="Looks; 0 goes on until Ctrl-C.")] = 0,
-    every: Annotated[float, typer.Option(min=0.0, help="Pause between looks in s.")] = 0.5,
+    every_s: Annotated[float, typer.Option(min=0.0, help="Pause between looks [s].")] = 0.5,
     as_json: AsJson = False,
 ) -> None:
     """Show the shift against the latest reference, live: drift of the border, and what moves inside."""
@@ -158,4 +152,4 @@ def watch(
                 )
             else:
                 typer.echo(f"drift {columns:+.3f}, {rows:+.3f} px; inside up to {inner:.3f} px")
-            time.sleep(every)
+            time.sleep(every_s)

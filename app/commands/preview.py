@@ -15,17 +15,16 @@ def register(cli: typer.Typer) -> None:
 def preview(
     experiment: Annotated[Path, typer.Argument(help="Experiment folder, whose rig names the camera.")],
     out: Annotated[Path | None, typer.Option(help="Write the picture here (PNG).")] = None,
-    exposure: Annotated[float | None, typer.Option(help="Exposure time in s.")] = None,
+    exposure_s: Annotated[float | None, typer.Option(help="Exposure time [s] of this picture.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Take one frame; print its level, contrast, focus and saturation with advice."""
     from app.experiment.folder import open_experiment
     from app.rig.frame_report import judge_frame, write_picture
     from app.rig.open import open_camera
+    from drivers.settings import held
 
-    with open_camera(open_experiment(experiment), "still") as camera:
-        if exposure is not None:
-            camera.exposure_s = exposure
+    with open_camera(open_experiment(experiment), "still") as camera, held(camera, exposure_s):
         frame = camera.grab()
         quality = judge_frame(camera, frame)
         info = camera.info

@@ -32,11 +32,6 @@ class BurstImage:
     std: Image
     frames: int
 
-    @property
-    def mean_std(self) -> Image:
-        """Standard deviation of the mean."""
-        return self.std / np.float32(max(self.frames, 1) ** 0.5)
-
 
 def write_image(path: Path, image: BurstImage) -> None:
     """Write mean (page 1) and standard deviation (page 2) durably."""

@@ -89,7 +89,7 @@ def write_capture(
     `role` is the plan's kind unless given; `origin` (hashes, seed, ...) goes into the manifest as it is.
     """
     bursts = [burst] if isinstance(burst, Burst) else list(burst)
-    role = role or bursts[0].plan.kind
+    role = role or bursts[0].plan.role
     views = []
     for number, one in enumerate(bursts):
         path = folder / image_name(role, number)
@@ -175,7 +175,7 @@ class CaptureRecorder:
         folder.mkdir()
         sync(folder.parent)
         started = datetime.now(UTC).isoformat(timespec="seconds")
-        about = {"role": plan.kind, "plan": to_plain(plan), "started": started, "process": os.getpid()}
+        about = {"role": plan.role, "plan": to_plain(plan), "started": started, "process": os.getpid()}
         write_json(folder / "incomplete.json", about)
         self.folder, self._checkpoint_s = folder, checkpoint_s
         self._saved_s = float("-inf")
@@ -202,13 +202,19 @@ class CaptureRecorder:
         if burst.outcome in (BurstOutcome.COMPLETE, BurstOutcome.ABORTED):
             return write_capture(self.folder, burst, origin=origin)
         write_image(self.folder / "partial.tif", BurstImage(burst.mean, burst.std, burst.frames))
-        write_json(self.folder / "incomplete.json", {"role": burst.plan.kind} | describe_burst(burst))
+        write_json(self.folder / "incomplete.json", {"role": burst.plan.role} | describe_burst(burst))
         return self.folder
 
     def discard(self) -> None:
         """Remove the folder and what was taken."""
         self._close()
         shutil.rmtree(self.folder)
+
+    def leave(self) -> None:
+        """End without a burst: frames stay as an interrupted capture; where there are none, nothing stays."""
+        self._close()
+        if not any((self.folder / name).exists() for name in ("partial.tif", "manifest.json")):
+            shutil.rmtree(self.folder, ignore_errors=True)
 
     def _close(self) -> None:
         if self._stack:

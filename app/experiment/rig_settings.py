@@ -22,7 +22,11 @@ class SimulatedCameraSettings(Strict):
 
 
 class V4l2CameraSettings(Strict):
-    """A camera that the kernel knows (Video for Linux)."""
+    """A camera that the kernel knows (Video for Linux).
+
+    `frame_rate_hz` is the camera's own unless given; automatic exposure, gain, white balance and focus are
+    switched off unless `automatics_off` is false.
+    """
 
     kind: Literal["v4l2"]
     device: str = "/dev/video0"
@@ -32,6 +36,8 @@ class V4l2CameraSettings(Strict):
     bits: Annotated[int, Field(ge=1, le=16)] = 16
     exposure_s: Annotated[float, Field(gt=0, le=60)]
     gain: float | None = None
+    frame_rate_hz: Annotated[float | None, Field(gt=0, le=10_000)] = None
+    automatics_off: bool = True
 
 
 CameraSettings = Annotated[SimulatedCameraSettings | V4l2CameraSettings, Field(discriminator="kind")]
@@ -62,7 +68,10 @@ class BoardSettings(Strict):
 
 
 class ProjectorSettings(Strict):
-    """How the projector is spoken to: `airlens projector` takes the same address; `simulated:` is a twin."""
+    """How the projector is spoken to: `airlens projector` takes the same address.
+
+    `simulated:?warm_up_s=15&cool_down_s=10` is a twin, of an Epson unless a dialect stands after the colon.
+    """
 
     url: str
 

@@ -8,14 +8,5 @@ from drivers.v4l2 import V4l2Camera, V4l2Request
 
 def open_v4l2(settings: V4l2CameraSettings) -> V4l2Camera:
     """Open the camera as the settings say. Raises DeviceError when it is away, in use, or grants less."""
-    return V4l2Camera(
-        V4l2Request(
-            Path(settings.device),
-            settings.width_px,
-            settings.height_px,
-            pixel_format=settings.pixel_format,
-            exposure_s=settings.exposure_s,
-            gain=settings.gain,
-            bits=settings.bits,
-        )
-    )
+    content = settings.model_dump(exclude={"kind", "device"})
+    return V4l2Camera(V4l2Request(Path(settings.device), **content))

@@ -1,7 +1,9 @@
 """How warm the room was and how long the devices had been on: what a calibration and a capture must share."""
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from app.calibrate.folder import CalibrationFolder
 from app.experiment.folder import ExperimentSettings
@@ -40,10 +42,20 @@ def seconds_on(settings: ExperimentSettings | None, told: Conditions) -> float |
     return None if minutes is None else 60 * minutes
 
 
+def known_pairs(conditions: Conditions) -> dict[str, float]:
+    """What is known, by the names that flags, requests, manifests and bundles share."""
+    return {name: value for name, value in dataclasses.asdict(conditions).items() if value is not None}
+
+
+def conditions_in(content: Mapping[str, Any]) -> Conditions:
+    """What `known_pairs` wrote."""
+    return Conditions(content.get("ambient_temperature_k"), content.get("minutes_on"))
+
+
 def note_conditions(calibration: CalibrationFolder, conditions: Conditions) -> None:
     """Write the conditions into the bundle, if there is one; what is not known leaves what was."""
     if not (calibration.folder / "bundle.json").exists():
         return
-    known = {name: value for name, value in dataclasses.asdict(conditions).items() if value is not None}
+    known = known_pairs(conditions)
     if known:
         calibration.save_bundle(dataclasses.replace(calibration.bundle(), **known))

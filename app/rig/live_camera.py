@@ -7,13 +7,14 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 from app.rig.frame_statistics import LiveFrame, jpeg_of, statistics_of
 from drivers.errors import DeviceBusyError, DeviceError, DeviceNotFoundError, DeviceSettingError, FrameError
 from drivers.protocols import Camera, Frame
+from drivers.settings import set_on
 
 LONGEST_RATE_HZ = 30.0
 # While this machine computes: enough for the eyes, and a third of the cost.
@@ -47,9 +48,19 @@ class CameraStatus:
     reason: str = ""
 
 
+@dataclass(frozen=True)
+class _Wish:
+    """What the operator set, and what the camera had been opened with."""
+
+    opened: tuple[float | None, float | None]
+    exposure_s: float | None = None
+    gain: float | None = None
+
+
 class LiveCamera:
     """The one camera of a service. `tell(kind, body)` hears of every change of state.
 
+    What `set` sets stays when the same rig is opened again, until its experiment.toml names other settings.
     `busy` says whether a job runs on this machine: then the live picture is shown less often.
     """
 
@@ -72,6 +83,7 @@ class LiveCamera:
         self._generation = 0
         self._thread: threading.Thread | None = None
         self._number = 0
+        self._wishes: dict[str, _Wish] = {}
 
     @property
     def status(self) -> CameraStatus:
@@ -90,13 +102,14 @@ class LiveCamera:
         self._change(CameraStatus(CameraState.opening, experiment))
         try:
             camera = make()
+            told = self._wish_again(camera, experiment)
         except Exception as error:
             self._change(CameraStatus(CameraState.failed, experiment, reason=str(error)))
             raise
         with self._use:
             self._camera = camera
             self._generation += 1
-        self._change(_status_of(camera, CameraState.ready, experiment))
+        self._change(replace(_status_of(camera, CameraState.ready, experiment), reason=told))
         self._thread = threading.Thread(
             target=self._run, args=(camera, self._generation), name="live-camera", daemon=True
         )
@@ -119,10 +132,13 @@ class LiveCamera:
     def set(self, exposure_s: float | None, gain: float | None) -> CameraStatus:
         """Set what is given and return what the camera granted. Raises DeviceError."""
         with self.using(CameraState.ready) as camera:
-            if exposure_s is not None:
-                camera.exposure_s = exposure_s
-            if gain is not None:
-                camera.gain = gain
+            set_on(camera, exposure_s, gain)
+            before = self._wishes[self._status.experiment or ""]
+            self._wishes[self._status.experiment or ""] = _Wish(
+                before.opened,
+                before.exposure_s if exposure_s is None else exposure_s,
+                before.gain if gain is None else gain,
+            )
         return self._status
 
     @contextlib.contextmanager
@@ -180,6 +196,19 @@ class LiveCamera:
         """Stop watching; without watchers the camera rests."""
         self._listeners.pop(key, None)
         self._stretches.pop(key, None)
+
+    def _wish_again(self, camera: Camera, experiment: str) -> str:
+        """Set what the operator had set on this rig; return why not, where the camera refuses it."""
+        opened = (camera.exposure_s, camera.gain)
+        wish = self._wishes.get(experiment)
+        if wish is None or wish.opened != opened:
+            self._wishes[experiment] = _Wish(opened)
+            return ""
+        try:
+            set_on(camera, wish.exposure_s, wish.gain)
+        except DeviceSettingError as error:
+            return f"The settings that were chosen before are not in use. {error}"
+        return ""
 
     def _run(self, camera: Camera, generation: int) -> None:
         while self._generation == generation:

@@ -22,17 +22,13 @@ from core.fields import GridField
 from core.geometry import Box, Optics, crop, rotation_matrix, rotation_vector
 from core.render import render_flow, render_reference
 from core.scene import FixedTexture, ProjectedPattern, Scene, WaveletPattern
+from drivers.burst import CaptureRole
 from drivers.clock import SystemClock
 from drivers.display import PatternDisplay, Picture
-from drivers.projector.escvp21 import EscVp21
-from drivers.projector.link import ProjectorLink
 from drivers.projector.protocol import Projector
 from drivers.protocols import Camera
 from drivers.simulated import SensorNoise, SimulatedCamera, SimulatedDisplay
-from drivers.simulated.projector.engine import SimulatedProjector
-from drivers.simulated.projector.escvp21 import EscVp21Twin
-from drivers.simulated.projector.hosts import LoopPort
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.open import TWINS, open_twin
 from drivers.v4l2 import list_devices
 
 AirState = Literal["still", "moving"]
@@ -62,6 +58,11 @@ def named_camera(experiment: Experiment) -> CameraSettings:
     )
 
 
+def air_of(role: CaptureRole) -> AirState:
+    """What the air of a simulated room does during a capture of that role."""
+    return "moving" if role == "flow" else "still"
+
+
 def open_projector(experiment: Experiment) -> Projector:
     """Return the experiment's projector; its line opens when it is first asked. Raises BadInputError."""
     settings = experiment.settings.rig.projector
@@ -74,16 +75,17 @@ def open_projector(experiment: Experiment) -> Projector:
 
 
 def _twin(url: str) -> Projector:
-    """The twin of an Epson; `simulated:?warm_up_s=15&cool_down_s=10` sets its times."""
-    asked = parse_qs(urlsplit(url).query)
+    """The twin of a dialect (else of an Epson): `simulated:benq?warm_up_s=15&cool_down_s=10` sets its times."""
     try:
+        parts = urlsplit(url)
+        asked = parse_qs(parts.query)
         warm_up_s, cool_down_s = (float(asked[name][-1]) for name in ("warm_up_s", "cool_down_s"))
+        return open_twin(parts.path or "escvp21", SystemClock(), warm_up_s, cool_down_s)
     except (KeyError, ValueError) as error:
         raise BadInputError(
-            f"{url!r} is no simulated projector ({error}); expected simulated:?warm_up_s=15&cool_down_s=10."
+            f"{url!r} is no simulated projector ({error}); expected simulated:?warm_up_s=15&cool_down_s=10, "
+            f"the dialect after the colon: {', '.join(TWINS)}."
         ) from None
-    state = ProjectorState(SystemClock(), warm_up_s, cool_down_s)
-    return ProjectorLink(EscVp21(), LoopPort(SimulatedProjector(EscVp21Twin(state))))
 
 
 def open_stage(

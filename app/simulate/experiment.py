@@ -5,16 +5,17 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.capture.acquire import acquire
-from app.errors import BadInputError
+from app.capture.burst import Watch, take
+from app.errors import AirlensError, BadInputError
 from app.experiment.folder import ExperimentSettings, create_experiment
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.files.durable import write_durably, write_text
+from app.rig.open import air_of, open_camera
 from app.volume.file import RoomVolume, read_volume
 from app.volume.scene import Information, RigOptions, room_scene, write_plane
 from calibration.bundle import given_bundle, to_json
 from core.scene import PlaneField, ProjectedPattern, Scene
-from drivers.burst import CapturePlan, Progress
+from drivers.burst import CapturePlan, CaptureRole, Progress
 
 TRUTH_FILE = "truth.npz"
 
@@ -70,14 +71,18 @@ def _fill(
     if any(isinstance(known, PlaneField) for known in scene.boundary):
         write_plane(folder, volume)
     write_text(experiment.bundle_path, to_json(_bundle(scene)))
-    for role in ("reference", "flow"):
-        plan = CapturePlan(kind=role, frames=1 if camera.noise_free else scene.views[0].frames)
+    roles: tuple[CaptureRole, ...] = ("reference", "flow")
+    for role in roles:
+        plan = CapturePlan(role=role, frames=1 if camera.noise_free else scene.views[0].frames)
 
         def progress(p: Progress, role: str = role) -> None:
             on_stage(role, p.done, p.total)
 
         on_stage(role, 0, plan.frames)
-        acquire(experiment, plan, progress)
+        with open_camera(experiment, air_of(role)) as opened:
+            taken = take(opened, experiment, plan, watch=Watch(progress))
+        if taken.shortfall:
+            raise AirlensError(taken.shortfall)
 
 
 def _bundle(scene: Scene):

@@ -30,7 +30,7 @@ def captured(
     experiment = create_experiment(folder / "experiment", ExperimentSettings(scene=scene))
     picture = np.clip(level * pattern(), 0.0, 4.0)
     for role in roles:
-        take(SimulatedCamera(lambda: picture, seed=1), experiment, CapturePlan(kind=role, frames=2))
+        take(SimulatedCamera(lambda: picture, seed=1), experiment, CapturePlan(role=role, frames=2))
     return experiment.folder
 
 

@@ -28,7 +28,7 @@ def main() -> None:
         truths = experiment(folder, scale)
         for step in ("camera", "projector", "wall", "response"):
             began_s = time.process_time()
-            done = run(step, folder, *([] if step == "camera" else ["--settle", 0]))
+            done = run(step, folder, *([] if step == "camera" else ["--settle-s", 0]))
             assert done.exit_code == 0, done.output
             line[f"{step}_cpu_s"] = round(time.process_time() - began_s, 1)
         bundle = from_json((folder / "calibration" / "bundle.json").read_text())

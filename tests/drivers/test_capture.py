@@ -110,7 +110,7 @@ def test_refresh_beat_and_warm_up_are_warned_of_with_the_remedy():
 def test_dark_frames_are_judged_as_dark_frames():
     noise = SensorNoise(dark_counts=64.0)
     burst = run_capture(
-        make_camera(np.zeros((64, 64), np.float32), noise=noise), CapturePlan(kind="dark", frames=20)
+        make_camera(np.zeros((64, 64), np.float32), noise=noise), CapturePlan(role="dark", frames=20)
     )
     assert verdict(burst, "dark level").good
     # Read noise of 3 e at 0.403 counts/e, rounded to whole counts.

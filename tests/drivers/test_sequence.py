@@ -11,7 +11,7 @@ from tests.drivers.scenes import pattern
 def make_take(clock):
     view = pattern()
     camera = SimulatedCamera(lambda: view, seed=1, clock=clock)
-    return lambda start: run_capture(camera, CapturePlan(kind="flow", frames=5, settle_frames=0), clock=clock)
+    return lambda start: run_capture(camera, CapturePlan(role="flow", frames=5, settle_frames=0), clock=clock)
 
 
 def test_bursts_begin_when_they_are_due():

@@ -169,7 +169,7 @@ def _tells_full(text: str) -> bool:
 def take_burst() -> Burst:
     view = pattern()
     camera = SimulatedCamera(lambda: view, seed=5)
-    return run_capture(camera, CapturePlan(kind="flow", frames=2, exposure_s=0.01))
+    return run_capture(camera, CapturePlan(role="flow", frames=2, exposure_s=0.01))
 
 
 def record(folder: Path, wanted: Sequence[JobSpec]) -> list[dict[str, Any]]:

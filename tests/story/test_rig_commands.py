@@ -38,18 +38,18 @@ def test_a_preview_judges_one_frame_and_writes_a_picture(folder, tmp_path):
 
 
 def test_captures_land_in_the_experiment_and_a_sequence_has_its_times(folder):
-    (taken,) = run("capture", "reference", folder, "--frames", 6, "--exposure", 0.02, "--json")
+    (taken,) = run("capture", "reference", folder, "--frames", 6, "--exposure-s", 0.02, "--json")
     assert taken["outcome"] == "complete"
     assert taken["settings"]["exposure_s"] == {"asked": 0.02, "granted": 0.02}
     assert open_experiment(folder).latest_capture("reference") == Path(taken["folder"])
-    three = run("capture", "flow", folder, "--frames", 2, "--bursts", 3, "--every", 0.2, "--json")
+    three = run("capture", "flow", folder, "--frames", 2, "--bursts", 3, "--every-s", 0.2, "--json")
     assert len({one["folder"] for one in three}) == 3
-    (raw,) = run("capture", "flow", folder, "--frames", 2, "--raw", "--json")
+    (raw,) = run("capture", "flow", folder, "--frames", 2, "--raw-stack", "--json")
     assert (Path(raw["folder"]) / "frames.tif").exists()
 
 
 def test_the_watch_tells_drift_from_what_moves_inside(folder):
-    looks = run("capture", "watch", folder, "--count", 2, "--every", 0, "--json")
+    looks = run("capture", "watch", folder, "--count", 2, "--every-s", 0, "--json")
     assert len(looks) == 2
     for look in looks:
         # The rig drifted by 0.3 px and rolled as much at the edge; one frame is noisy.

@@ -10,12 +10,17 @@ Role = Literal["reference", "flow", "dark", "flat"]
 
 
 class DeskResource(Strict):
-    """The capture that is being taken, or the last one."""
+    """The capture that is being taken, or the last one.
+
+    `done` of `total` frames are taken of burst number `burst` of `bursts`.
+    """
 
     state: Literal["idle", "running", "finished", "aborted", "incomplete", "failed"]
     experiment: str | None
     capture: str | None
     role: str | None
+    burst: int
+    bursts: int
     done: int
     total: int
     refused: int
@@ -24,14 +29,25 @@ class DeskResource(Strict):
 
 
 class NewCapture(Strict):
-    """A burst; settings that are left out stay as they are."""
+    """A burst, or several: every field by the name that it has on the command line and in the manifest.
+
+    `exposure_s` and `gain` hold for this capture; left out, they are the camera's own. `minutes_on` says how
+    long the rig has been on; left out, the projector's lamp tells. So does the scene the temperature.
+    """
 
     role: Role
     frames: int = Field(default=100, ge=1, le=100_000)
     exposure_s: float | None = Field(default=None, gt=0, le=60)
     gain: float | None = Field(default=None, ge=0, le=1000)
     settle_s: float = Field(default=0.0, ge=0, le=600)
+    settle_frames: int = Field(default=30, ge=0, le=1000)
+    max_refused: int = Field(default=100, ge=0, le=100_000)
+    refresh_hz: float | None = Field(default=None, gt=0, le=1000)
     raw_stack: bool = False
+    bursts: int = Field(default=1, ge=1, le=10_000)
+    every_s: float = Field(default=0.0, ge=0, le=86_400)
+    ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
+    minutes_on: float | None = Field(default=None, ge=0, le=1e6)
 
 
 class Abort(Strict):
@@ -51,11 +67,11 @@ class VerdictResource(Strict):
 
 
 class SettingResource(Strict):
-    """A setting as asked for and as granted."""
+    """A setting as asked for and as granted; null where the camera has no such control."""
 
     name: str
     asked: float | None
-    granted: float
+    granted: float | None
 
 
 class CaptureResource(Strict):

@@ -36,6 +36,7 @@ class GuideResource(Strict):
     """A guided calibration. While `state` is running, `done` of `total` pictures of `wanted` are taken.
 
     `busy` is true also while another step, or another experiment's, takes pictures: none can be begun.
+    `started`: this step has taken pictures that are not in use yet; they will be when it wants nothing more.
     `coverage` holds rows of cells from the picture's top left; `residuals_px` holds column, row, and the
     residual there, in pixels of a picture of `width_px` x `height_px`.
     """
@@ -49,6 +50,7 @@ class GuideResource(Strict):
     total: int
     issues: list[str]
     complete: bool
+    started: bool
     views: list[GuideView]
     width_px: int | None
     height_px: int | None

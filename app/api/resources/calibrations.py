@@ -8,7 +8,7 @@ from app.api.models.calibrations import CalibrationItem, CalibrationResource, Ne
 from app.api.services import Given
 from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
-from app.calibrate.guide import StepName
+from app.calibrate.folder import StepName
 from app.calibrate.parts import Part, bundle_of, is_calibrated, parts_of
 from app.experiment.folder import Experiment
 from app.simulate.rehearsal import calibrate_simulated

@@ -1,5 +1,6 @@
 """Captures: take, watch, abort, keep or discard, look at, annotate."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,10 +23,12 @@ from app.api.wire.bodies import body
 from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
 from app.api.wire.volumes import Encoding, pack
+from app.capture.burst import Order
 from app.experiment.capture_files import BurstImage
 from app.experiment.captures import load_capture
 from app.experiment.folder import read_manifest
 from app.files.durable import write_text
+from app.rig.conditions import conditions_in
 from drivers.burst import CapturePlan
 
 router = APIRouter(tags=["captures"])
@@ -49,15 +52,14 @@ def abort_capture(given: Given, wanted: Abort) -> DeskResource:
 @router.post("/experiments/{experiment}/captures", status_code=202)
 def start_capture(given: Given, experiment: Identifier, new: NewCapture) -> DeskResource:
     """Begin a capture; it goes on when the browser is closed."""
-    plan = CapturePlan(
-        kind=new.role,
-        frames=new.frames,
-        exposure_s=new.exposure_s,
-        gain=new.gain,
-        settle_s=new.settle_s,
-        raw_stack=new.raw_stack,
-    )
-    return DeskResource.of(given.desk.start(given.folders.open(experiment), plan))
+    return DeskResource.of(given.desk.start(given.folders.open(experiment), order_of(new)))
+
+
+def order_of(new: NewCapture) -> Order:
+    """The same for the camera. Raises DeviceSettingError for several bursts without `every_s`."""
+    content = new.model_dump()
+    plan = {field.name: content[field.name] for field in fields(CapturePlan)}
+    return Order(CapturePlan(**plan), new.bursts, new.every_s, conditions_in(content))
 
 
 @router.get("/experiments/{experiment}/captures")
@@ -153,7 +155,7 @@ def _resource(folder: Path) -> CaptureResource:
 
 def _float(content: dict[str, Any], name: str) -> dict[str, Any]:
     """JSON writes 1.0 as 1 or 1.0 as its writer likes; ours is a float."""
-    return {**content, name: float(content[name])}
+    return content if content[name] is None else {**content, name: float(content[name])}
 
 
 def _interrupted(folder: Path) -> CaptureResource:

@@ -8,8 +8,8 @@ from app.api.models.guide import GuideRequest, GuideResource, GuideView, StepTex
 from app.api.services import Given, Services
 from app.api.wire.board import board_settings
 from app.api.wire.identifier import Identifier
-from app.calibrate.folder import CalibrationFolder
-from app.calibrate.guide import LivePlan, StepName
+from app.calibrate.folder import CalibrationFolder, StepName
+from app.calibrate.guide import LivePlan
 from app.calibrate.service import GuideState
 from app.calibrate.state import state_of
 from app.errors import BadInputError
@@ -54,6 +54,15 @@ def stop_guided(given: Given, experiment: Identifier, step: StepQuery = "camera"
     found = given.folders.open(experiment)
     given.guide.stop()
     return _resource(given, found, _plan(found, GuideRequest(step=step)))
+
+
+@router.delete("/experiments/{experiment}/calibration/guide")
+def discard_guided(given: Given, experiment: Identifier, step: StepQuery = "camera") -> GuideResource:
+    """Forget what a step has taken and not completed; the calibration in use stays as it is."""
+    found = given.folders.open(experiment)
+    plan = _plan(found, GuideRequest(step=step))
+    given.guide.discard(found, plan)
+    return _resource(given, found, plan)
 
 
 @router.delete("/experiments/{experiment}/calibration/views/{view}")
@@ -103,7 +112,8 @@ def _resource(given: Services, experiment: Experiment, plan: LivePlan) -> GuideR
         wanted = status.wanted if running else given.guide.wanted(experiment, plan)
     except BadInputError as error:
         wanted, reason = None, str(error)
-    state = state_of(CalibrationFolder(experiment.folder).record(plan.camera), plan.step)
+    folder = CalibrationFolder(experiment.folder)
+    state = state_of(folder.collected(plan.camera), plan.step)
     return GuideResource(
         state=status.state.value if own else "idle",
         busy=status.state is GuideState.running,
@@ -114,6 +124,7 @@ def _resource(given: Services, experiment: Experiment, plan: LivePlan) -> GuideR
         total=status.total if own else 0,
         issues=list(status.issues) if own else [],
         complete=state.complete,
+        started=folder.started(plan.camera) is plan.step,
         views=[
             GuideView(name=v.name, points=v.points, rms_px=v.rms_px, issues=list(v.issues))
             for v in state.views

@@ -3,29 +3,16 @@
 import re
 
 from drivers.projector.protocol import PowerState
-from drivers.simulated.projector.responder import Reply
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.responder import CrCommands, Reply
 
 _COMMAND = re.compile(r"\*([a-z0-9]+)=([^#]*)#")
 
 
-class BenQTwin:
+class BenQTwin(CrCommands):
     """Responds as a BenQ with a prompt does."""
 
     error = b"Illegal format\r\n>"
     news = b"\r\n*VOL=5#\r\n>"
-
-    def __init__(self, state: ProjectorState) -> None:
-        self.state = state
-
-    def greeting(self) -> bytes:
-        """Nothing: the prompt comes when asked for."""
-        return b""
-
-    def split(self, buffer: bytes) -> tuple[list[bytes], bytes]:
-        """Commands end with CR."""
-        *commands, rest = buffer.split(b"\r")
-        return commands, rest
 
     def respond(self, command: bytes) -> list[Reply]:
         """Return echo, answer and prompt; an empty line gets the prompt alone."""

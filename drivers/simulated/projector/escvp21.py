@@ -1,29 +1,16 @@
 """The Epson side of ESC/VP21. A lamp that is being lit answers nothing until it is lit."""
 
 from drivers.projector.protocol import PowerState
-from drivers.simulated.projector.responder import Reply
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.responder import CrCommands, Reply
 
 _POWER = {PowerState.STANDBY: "00", PowerState.ON: "01", PowerState.WARMING: "02", PowerState.COOLING: "03"}
 
 
-class EscVp21Twin:
+class EscVp21Twin(CrCommands):
     """Responds as an Epson does."""
 
     error = b"ERR\r:"
     news = b"IMEVENT=0001 03 00000002 00000000 T1 F1\r:"
-
-    def __init__(self, state: ProjectorState) -> None:
-        self.state = state
-
-    def greeting(self) -> bytes:
-        """Nothing: it waits to be spoken to."""
-        return b""
-
-    def split(self, buffer: bytes) -> tuple[list[bytes], bytes]:
-        """Commands end with CR."""
-        *commands, rest = buffer.split(b"\r")
-        return commands, rest
 
     def respond(self, command: bytes) -> list[Reply]:
         """Return the reply to one command."""

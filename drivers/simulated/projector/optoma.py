@@ -3,27 +3,14 @@
 import re
 
 from drivers.projector.protocol import PowerState
-from drivers.simulated.projector.responder import Reply
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.responder import CrCommands, Reply
 
 
-class OptomaTwin:
+class OptomaTwin(CrCommands):
     """Responds as an Optoma does."""
 
     error = b"F\r"
     news = b"INFO0\r"
-
-    def __init__(self, state: ProjectorState) -> None:
-        self.state = state
-
-    def greeting(self) -> bytes:
-        """Nothing."""
-        return b""
-
-    def split(self, buffer: bytes) -> tuple[list[bytes], bytes]:
-        """Commands end with CR."""
-        *commands, rest = buffer.split(b"\r")
-        return commands, rest
 
     def respond(self, command: bytes) -> list[Reply]:
         """Return P, F or the information line; a switch announces itself."""

@@ -3,31 +3,26 @@
 import hashlib
 
 from drivers.projector.protocol import PowerState
-from drivers.simulated.projector.responder import Reply
+from drivers.simulated.projector.responder import CrCommands, Reply
 from drivers.simulated.projector.state import ProjectorState
 
 _POWER = {PowerState.STANDBY: "0", PowerState.ON: "1", PowerState.COOLING: "2", PowerState.WARMING: "3"}
 
 
-class PjLinkTwin:
+class PjLinkTwin(CrCommands):
     """Responds as a PJLink projector does; `salt` is the random number of the greeting (8 hex digits)."""
 
     error = b"%1POWR=ERR4\r"
     news = b"%2LKUP=00:11:22:33:44:55\r"
 
     def __init__(self, state: ProjectorState, password: str = "", salt: str = "498e4a67") -> None:
-        self.state = state
+        super().__init__(state)
         self._password, self._salt, self._trusted = password, salt, not password
 
     def greeting(self) -> bytes:
         """Say whether a password is wanted; each line must show it anew."""
         self._trusted = not self._password
         return b"PJLINK 0\r" if self._trusted else f"PJLINK 1 {self._salt}\r".encode()
-
-    def split(self, buffer: bytes) -> tuple[list[bytes], bytes]:
-        """Commands end with CR."""
-        *commands, rest = buffer.split(b"\r")
-        return commands, rest
 
     def respond(self, command: bytes) -> list[Reply]:
         """Return the reply to one command; the first must carry the digest."""

@@ -33,3 +33,19 @@ class Responder(Protocol):
     def respond(self, command: bytes) -> list[Reply]:
         """Return the replies to one command; none means silence."""
         ...
+
+
+class CrCommands:
+    """What the dialects share whose commands end with CR, and who wait to be spoken to."""
+
+    def __init__(self, state: ProjectorState) -> None:
+        self.state = state
+
+    def greeting(self) -> bytes:
+        """Nothing."""
+        return b""
+
+    def split(self, buffer: bytes) -> tuple[list[bytes], bytes]:
+        """Commands end with CR."""
+        *commands, rest = buffer.split(b"\r")
+        return commands, rest

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from app.calibrate.folder import CalibrationFolder
-from app.calibrate.guide import GuidedCalibration, LivePlan, StepName
+from app.calibrate.folder import CalibrationFolder, StepName
+from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.cli import create_cli
 from app.experiment.folder import ExperimentSettings, create_experiment
 from app.experiment.rig_settings import BoardSettings, RigSettings, SimulatedCameraSettings
@@ -63,7 +63,7 @@ def calibrated(tmp_path_factory) -> tuple[Path, Optics, Optics]:
     folder = tmp_path_factory.mktemp("live") / "experiment"
     camera, projector = experiment(folder, 0.4)
     for step in ("camera", "projector", "wall", "response"):
-        done = run(step, folder, "--minutes-on", 45, *([] if step == "camera" else ["--settle", 0]))
+        done = run(step, folder, "--minutes-on", 45, *([] if step == "camera" else ["--settle-s", 0]))
         assert done.exit_code == 0, (step, done.output, done.exception)
     return folder, camera, projector
 
@@ -143,7 +143,7 @@ def test_half_a_sequence_is_taken_anew_and_ctrl_c_keeps_the_whole_ones(tmp_path)
     folder = tmp_path / "stopped"
     experiment(folder, 0.25)
     places = folder / "calibration" / "live-projector"
-    command = [*AIRLENS, "projector", str(folder), "--settle", "0.1"]
+    command = [*AIRLENS, "projector", str(folder), "--settle-s", "0.1"]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     until_s = time.monotonic() + 200
     while len(list(places.glob("place_01/*.png"))) < 3 and time.monotonic() < until_s:
@@ -154,7 +154,7 @@ def test_half_a_sequence_is_taken_anew_and_ctrl_c_keeps_the_whole_ones(tmp_path)
     assert process.returncode == 1
     assert "goes on from there" in said
     assert "1 usable board views; expected at least 3" in said or "not complete" in said
-    record = CalibrationFolder(folder).record("camera")
+    record = CalibrationFolder(folder).collected("camera")
     assert record is not None
     assert [board.name for board in record.boards] == ["place_00/graycode"]
     assert 0 < len(list(places.glob("place_01/*.png"))) < 38

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from app.capture.burst import interruptible, take, take_sequence
+from app.capture.burst import Order, Watch, interruptible, take, take_order
 from app.experiment.captures import load_capture
 from app.experiment.folder import ExperimentSettings, create_experiment
 from app.rig.frame_report import judge_frame, write_picture
@@ -35,7 +35,7 @@ def make_camera(**options):
 
 
 def test_a_burst_becomes_a_capture_of_the_experiment(experiment):
-    taken = take(make_camera(), experiment, CapturePlan(kind="reference", frames=4))
+    taken = take(make_camera(), experiment, CapturePlan(role="reference", frames=4))
     assert experiment.latest_capture("reference") == taken.folder
     assert load_capture(taken.folder).images[0].frames == 4
 
@@ -43,10 +43,10 @@ def test_a_burst_becomes_a_capture_of_the_experiment(experiment):
 def test_an_aborted_burst_is_kept_or_discarded_as_said(experiment):
     for on_abort in ("keep", "discard"):
         done = []
-        plan = CapturePlan(kind="flow", frames=50)
-        taken = take(
-            make_camera(), experiment, plan, done.append, abort=lambda n=done: len(n) >= 3, on_abort=on_abort
-        )
+        plan = CapturePlan(role="flow", frames=50)
+        watch = Watch(done.append, stop=lambda n=done, on=on_abort: on if len(n) >= 3 else None)
+        taken = take(make_camera(), experiment, plan, watch=watch)
+        assert "3 of 50 frames" in taken.shortfall
         assert taken.burst.outcome is BurstOutcome.ABORTED
         assert (taken.folder is None) == (on_abort == "discard")
     folders = list(experiment.captures_folder.iterdir())
@@ -56,13 +56,45 @@ def test_an_aborted_burst_is_kept_or_discarded_as_said(experiment):
 
 def test_a_sequence_is_one_capture_a_burst_with_its_times(experiment):
     camera = make_camera(clock=SystemClock(), frame_rate_hz=200.0, exposure_s=0.004)
-    taken = take_sequence(camera, experiment, CapturePlan(kind="flow", frames=3, settle_frames=0), (0.0, 0.5))
+    plan = CapturePlan(role="flow", frames=3, settle_frames=0)
+    begun = []
+    taken = take_order(camera, experiment, Order(plan, 2, 0.5), Watch(begun=begun.append), "first")
+    assert [one.folder for one in taken] == begun
+    assert begun[0].name == "first"
     times = [load_capture(one.folder).manifest["origin"]["sequence"] for one in taken]
-    assert [t["number"] for t in times] == [0, 1]
+    assert [(t["number"], t["bursts"], t["every_s"]) for t in times] == [(0, 2, 0.5), (1, 2, 0.5)]
     assert times[1]["due_s"] == 0.5
     assert times[1]["began_s"] >= 0.5  # how late it may be is up to the machine
     with pytest.raises(DeviceSettingError, match="apart"):
-        take_sequence(camera, experiment, CapturePlan(kind="flow", frames=300), (0.0, 0.5))
+        take_order(camera, experiment, Order(CapturePlan(role="flow", frames=300), 2, 0.5))
+    with pytest.raises(DeviceSettingError, match="every_s is 0"):
+        Order(plan, bursts=2)
+
+
+def test_what_fails_before_the_first_frame_leaves_nothing_and_after_it_what_was_taken(experiment):
+    with pytest.raises(DeviceSettingError):
+        take(make_camera(), experiment, CapturePlan(frames=4, gain=100.0))
+    assert list(experiment.captures_folder.iterdir()) == []
+
+    def full(taken):
+        if taken.moments.frames == 3:
+            raise OSError("No space left on device")
+
+    with pytest.raises(OSError, match="No space left"):
+        take(make_camera(), experiment, CapturePlan(frames=4), watch=Watch(frame=full))
+    (left,) = experiment.captures_folder.iterdir()
+    assert not load_capture(left).complete
+
+
+def test_a_flow_with_other_settings_than_its_reference_is_told(experiment):
+    camera = make_camera(exposure_s=0.01)
+    take(camera, experiment, CapturePlan(role="reference", frames=2))
+    same = take(camera, experiment, CapturePlan(role="flow", frames=2)).burst.verdicts
+    other = take(camera, experiment, CapturePlan(role="flow", frames=2, exposure_s=0.015)).burst.verdicts
+    for verdicts, good, off in ((same, True, 0.0), (other, False, 0.5)):
+        (exposure,) = [v for v in verdicts if v.name == "exposure_s of the reference"]
+        assert (exposure.good, exposure.value) == (good, pytest.approx(off))
+    assert camera.exposure_s == 0.01
 
 
 def interrupted(until) -> None:

@@ -49,7 +49,7 @@ def make_camera() -> SimulatedCamera:
 def test_a_capture_says_that_its_calibration_is_old_and_cold_and_the_result_will_too(experiment):
     told = Conditions(ambient_temperature_k=293.0, minutes_on=4.0)
     for role in ("reference", "flow"):
-        taken = take(make_camera(), experiment, CapturePlan(kind=role, frames=3), told=told)
+        taken = take(make_camera(), experiment, CapturePlan(role=role, frames=3), told=told)
     advice = [v.advice for v in taken.burst.verdicts if v.name == "calibration"]
     assert len(advice) == 3
     assert "30 days older" in advice[0]
@@ -70,9 +70,9 @@ def test_a_capture_says_that_its_calibration_is_old_and_cold_and_the_result_will
 
 def test_a_flow_says_how_far_the_border_moved(experiment):
     camera = make_camera()
-    take(camera, experiment, CapturePlan(kind="reference", frames=8))
+    take(camera, experiment, CapturePlan(role="reference", frames=8))
     camera.shift_px = (0.3, -0.4)
-    taken = take(camera, experiment, CapturePlan(kind="flow", frames=8))
+    taken = take(camera, experiment, CapturePlan(role="flow", frames=8))
     (drift,) = [v for v in taken.burst.verdicts if v.name == "border drift"]
     assert drift.good
     assert drift.value == pytest.approx(0.5, abs=0.03)
@@ -80,7 +80,7 @@ def test_a_flow_says_how_far_the_border_moved(experiment):
     camera.shift_px = (2.0, 0.0)
     (far,) = [
         v
-        for v in take(camera, experiment, CapturePlan(kind="flow", frames=8)).burst.verdicts
+        for v in take(camera, experiment, CapturePlan(role="flow", frames=8)).burst.verdicts
         if v.name == "border drift"
     ]
     assert not far.good

@@ -27,7 +27,7 @@ def make_camera(**options):
 
 
 def test_a_capture_comes_back_with_its_metadata(tmp_path):
-    burst = run_capture(make_camera(), CapturePlan(kind="flow", frames=6, exposure_s=0.01))
+    burst = run_capture(make_camera(), CapturePlan(role="flow", frames=6, exposure_s=0.01))
     folder = write_capture(tmp_path / "one", burst, origin={"seed": 5})
 
     capture = load_capture(folder)

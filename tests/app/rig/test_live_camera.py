@@ -114,3 +114,41 @@ def test_the_picture_is_shown_less_often_while_the_machine_computes():
         live.close()
     # However long that took: not more than ten a second.
     assert len(shown_s) <= 10 * (time.monotonic() - began_s) + 2
+
+
+def test_what_the_operator_set_survives_a_reconnect_until_the_experiment_names_another():
+    camera = LiveCamera(lambda kind, body: None)
+
+    def made(exposure_s: float) -> SimulatedCamera:
+        return SimulatedCamera(lambda: SCENE, seed=1, exposure_s=exposure_s)
+
+    camera.open("room", lambda: made(0.02))
+    camera.set(exposure_s=0.012, gain=None)
+    camera.set(exposure_s=None, gain=3.0)
+    camera.open("other", lambda: made(0.02))
+    assert (camera.status.exposure_s, camera.status.gain) == (0.02, 1.0)
+    camera.open("room", lambda: made(0.02), "moving")
+    assert (camera.status.exposure_s, camera.status.gain, camera.status.reason) == (0.012, 3.0, "")
+    camera.open("room", lambda: made(0.03))
+    assert (camera.status.exposure_s, camera.status.gain) == (0.03, 1.0)
+    camera.close()
+
+
+def test_a_reconnect_says_which_settings_are_refused_now():
+    camera = LiveCamera(lambda kind, body: None)
+    camera.open("room", lambda: SimulatedCamera(lambda: SCENE, seed=1))
+    camera.set(exposure_s=None, gain=3.0)
+
+    class NoGain(SimulatedCamera):
+        @property
+        def gain(self) -> float:
+            return 1.0
+
+        @gain.setter
+        def gain(self, value: float) -> None:
+            raise DeviceSettingError("There is no gain control.")
+
+    camera.open("room", lambda: NoGain(lambda: SCENE, seed=1))
+    assert camera.status.state is CameraState.ready
+    assert "chosen before are not in use. There is no gain control." in camera.status.reason
+    camera.close()

@@ -42,6 +42,7 @@ def test_the_guide_asks_for_a_view_and_counts_it(airlens: Client, experiment: st
     assert [view.name for view in after.views] == ["view_00.png"]
     assert after.views[0].points == 54
     assert after.covered > 0.05
+    assert after.started
     assert after.wanted is not None
     assert after.wanted.nearer == "left"
     # The live picture showed it.
@@ -51,6 +52,7 @@ def test_the_guide_asks_for_a_view_and_counts_it(airlens: Client, experiment: st
 def test_views_are_forgotten_and_wants_are_skipped(airlens: Client, experiment: str):
     left = airlens.retake_view(experiment, "view_00.png")
     assert left.views == []
+    assert not left.started
     assert left.wanted is not None
     assert left.wanted.nearer == ""
     with pytest.raises(ServiceError, match="known are: none"):
@@ -76,3 +78,12 @@ def test_a_step_that_cannot_begin_says_why(airlens: Client, experiment: str):
     assert "calibrate" in answer.reason
     with pytest.raises(ServiceError, match="calibrate"):
         airlens.take_guided(experiment, "wall")
+
+
+def test_a_started_step_is_discarded(airlens: Client, experiment: str):
+    airlens.take_guided(experiment)
+    assert finished(airlens, experiment).started
+    discarded = airlens.discard_guided(experiment)
+    assert (discarded.started, discarded.views) == (False, [])
+    airlens.take_guided(experiment)
+    assert len(finished(airlens, experiment).views) == 1
