@@ -83,9 +83,9 @@ def _follow(
         index = list((at_m - low_m) / (high_m - low_m) * cells)
         return jnp.stack([map_coordinates(part, index, order=1, mode="nearest") for part in components])
 
-    def depth(time_s: Any, at_m: Any, nothing: PyTree, **state: Any) -> Array:
-        """How far within the room, as a share of it; zero on a wall."""
-        return jnp.min(jnp.minimum(at_m - low_m, high_m - at_m) / (high_m - low_m))
+    def depth(t: Any, y: Any, args: PyTree, **state: Any) -> Array:
+        """How far the point `y` lies within the room, as a share of it; zero on a wall."""
+        return jnp.min(jnp.minimum(y - low_m, high_m - y) / (high_m - low_m))
 
     def one(start_m: Array) -> tuple[Array, Array, Array]:
         solved = diffrax.diffeqsolve(
