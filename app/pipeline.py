@@ -1,13 +1,11 @@
 """The story on one screen: load the calibration, build the scene, check it, measure, solve, keep, report."""
 
 import json
+import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from app.capture.checks import aged
 from app.experiment.folder import Experiment, new_id, open_experiment, write_manifest
@@ -20,15 +18,12 @@ from app.plan.make import settled
 from app.reconstruct.agreement import rendered_agreement
 from app.reconstruct.measure import Measurement, measure, with_calibration
 from app.reconstruct.presets import preset as preset_called
-from app.reconstruct.presets import resolved, solve_with
+from app.reconstruct.presets import resolved, solved
 from app.report.page import write_report
 from core.result import Solution
 from core.solve.check import check_problem
-from core.solve.checkpoint import CheckpointStore
 from core.solve.recipes import regime_for
-
-OnStage = Callable[[str], object]
-OnEvent = Callable[[dict[str, Any]], object]
+from core.watch import Watch
 
 
 @dataclass(frozen=True)
@@ -45,18 +40,20 @@ def reconstruct(
     folder: Path,
     preset: str = "auto",
     *,
-    on_stage: OnStage = lambda stage: None,
-    on_event: OnEvent | None = None,
+    watch: Watch = Watch(),
     into: Path | None = None,
-    store: CheckpointStore | None = None,
-    should_stop: Callable[[], bool] | None = None,
 ) -> Reconstruction:
-    """Reconstruct the newest captures of an experiment. Raises BadInputError, SettingError.
+    """Reconstruct the newest captures of an experiment. Raises BadInputError, SettingError, StoppedError.
 
-    The result goes to a new folder among the experiment's results, or to `into`, which exists. A solver
-    that keeps checkpoints keeps them in `store` and ends soon after `should_stop` says so.
+    The result goes to a new folder among the experiment's results, or to `into`, which exists. A solver keeps in
+    `watch.store` what it can go on from; one that finds there another problem's, or other settings', starts afresh.
     """
     started = time.perf_counter()
+
+    def on_stage(stage: str) -> None:
+        watch.check_stop()
+        watch.tell({"doing": stage})
+
     experiment = open_experiment(folder)
     preset = resolved(preset, experiment.settings.scene)
     solve = preset_called(preset)
@@ -70,7 +67,7 @@ def reconstruct(
     on_stage("settle what auto leaves open")
     problem, choices = settled(measurement, preset)
     on_stage(f"solve ({preset})")
-    solution = solve_with(solve, problem, on_event=on_event, store=store, should_stop=should_stop)
+    solution = solved(solve, problem, watch)
     on_stage("keep the result")
     result = into or _new_folder(experiment, preset)
     told = {
@@ -90,6 +87,11 @@ def _new_folder(experiment: Experiment, preset: str) -> Path:
     return folder
 
 
+def _told(value: float | str) -> float | str | None:
+    """A number as JSON has it: what is not finite is none."""
+    return value if isinstance(value, str) or math.isfinite(value) else None
+
+
 def _keep(
     folder: Path,
     experiment: Experiment,
@@ -105,7 +107,7 @@ def _keep(
         {"title": experiment.settings.title, "preset": preset, "assumed": "\n".join(told["assumed"])},
     )
     write_shifts(folder, measurement.problem.shifts)
-    lines = (json.dumps({k: float(np.float64(v)) for k, v in row.items()}) for row in solution.history)
+    lines = (json.dumps({name: _told(value) for name, value in row.items()}) for row in solution.history)
     write_text(folder / "history.jsonl", "".join(line + "\n" for line in lines))
     write_manifest(
         folder,

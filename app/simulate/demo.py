@@ -12,6 +12,7 @@ from app.report.page import summary
 from app.simulate.experiment import TRUTH_FILE, simulate
 from app.volume.file import read_volume
 from app.volume.scene import RigOptions
+from core.watch import Watch
 
 _MARK = ".airlens-demo"
 
@@ -43,7 +44,8 @@ def run_demo(
         lambda role, done, total: on_stage(f"{role} capture: frame {done} of {total}"),
     )
     (folder / _MARK).touch()
-    done = reconstruct(folder, "draft", on_stage=on_stage)
+    watch = Watch(lambda row, growing: on_stage(str(row["doing"])))
+    done = reconstruct(folder, "draft", watch=watch)
     truth = read_volume(folder / TRUTH_FILE)
     sentences = summary(done.solution, done.measurement.problem.shifts, truth)
     return Story(sentences, done.folder / "report.html")
