@@ -39,18 +39,14 @@ def kept(tmp_path_factory):
     settings = ExperimentSettings(rig=RigSettings(camera=SimulatedCameraSettings()), scene=scene)
     experiment = create_experiment(tmp_path_factory.mktemp("kept") / "experiment", settings)
     for role in ("reference", "flow"):
-        burst = run_capture(SimulatedCamera(pattern, seed=1), CapturePlan(kind=role, frames=2))
+        burst = run_capture(SimulatedCamera(pattern, seed=1), CapturePlan(role=role, frames=2))
         write_capture(experiment.captures_folder / f"1-{role}", burst)
     captures = newest_pair(experiment)
     axis = np.linspace(-1.0, 1.0, 5)
     temperature_k = 293.0 + np.add.outer(np.add.outer(axis, axis), axis)
     solution = Solution(axis, axis, axis, temperature_k, notes=("solved",))
-    shift = ShiftMeasurement(
-        np.array([[8.0, 8.0], [24.0, 8.0]]),
-        np.array([[0.1, 0.0], [0.0, 0.2]]),
-        np.tile(np.eye(2), (2, 1, 1)),
-        16,
-    )
+    centres_px = np.array([[8.0, 8.0], [24.0, 8.0], [8.0, 24.0], [24.0, 24.0]])
+    shift = ShiftMeasurement(centres_px, 0.01 * centres_px, np.tile(np.eye(2), (4, 1, 1)), 16)
     manifest = {
         "preset": "draft", "outcome": "converged", "advice": "", "solver_s": 1.0, "wall_s": 2.0,
         "assumed": ["nothing"], "inputs": captures.inputs,

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 from typing import Literal
 
@@ -17,11 +18,12 @@ from core.estimate.parameter_fit import Background, coarse_fit, fine_fit
 from core.estimate.parameter_names import by_name
 from core.estimate.parameter_step import misfit_ratio
 from core.estimate.posterior import Analysis, solution
-from core.estimate.prior import Prior
+from core.estimate.prior import Prior, room_prior
 from core.geometry import Box, looking_along_y
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.result import Solution
+from core.room.forward import closure_name, room
 from core.scene import FixedTexture, FlowModel, Heater, Inlet, Outlet, Patch, Scene, View, Wall
 from core.solve.room import (
     RoomSettings,
@@ -75,6 +77,23 @@ def scene(supply: Inlet, flow: FlowModel = FlowModel(transport="given", viscosit
     )
 
 
+# The true room is marched on other cells than any that a fit uses, and traced on other vertices.
+TRUE_CELLS, TRUE_VERTICES = 14, 17
+
+
+def true_room(where: Scene, heat: float = 0.0) -> Solution:
+    """One march of the room as it is; `heat` is in prior deviations of a heater's coefficient."""
+    fine = room(where, TRUE_CELLS, closure_name(where))
+    prior = room_prior(Problem(where, ()), fine.layout)
+    vector = np.array([heat if name.startswith("heater_log_heat") else 0.0 for name in prior.names()])
+    parameters = prior.parameters(vector)
+    start = fine.at_rest(fine.model(parameters), np.zeros(fine.grid.cells[2]))
+    run = march_under(fine, parameters, start, 120.0, (TRUE_VERTICES,) * 3, lambda _: None)
+    fields, axis_m = run.fields, np.linspace(0.0, 2.0, TRUE_VERTICES)
+    kelvin = 293.15 + fields.excess_k
+    return Solution(axis_m, axis_m, axis_m, kelvin, fields.pressure_m2_s2, fields.velocity_m_s)
+
+
 @pytest.fixture(scope="module")
 def truth() -> Solution:
     """The room as it is, by the solver itself with nothing to correct."""
@@ -100,21 +119,20 @@ def measured(where: Scene, truth: Solution, noise_px: float) -> Problem:
     return Problem(where, (ShiftMeasurement(centres, shift, information, 16),), (plane,))
 
 
-def test_images_repair_a_supply_that_was_entered_wrongly(truth: Solution):
+def test_images_repair_a_supply_that_was_entered_wrongly():
     wrong = replace(SUPPLY, temperature_k=305.15, velocity_m_s=(0.48, 0.0, 0.0))
-    problem = measured(scene(wrong), truth, 1e-5)
+    problem = measured(scene(wrong), true_room(scene(SUPPLY)), 1e-5)
 
-    found = solve_room(problem, SETTINGS)
+    reported: list[dict] = []
+    found = solve_room(problem, SETTINGS, on_event=reported.append)
 
-    def supplied(room: Solution) -> tuple[float, float]:
-        """Inflow on the supply's wall, and the warmest air on it."""
-        return float(np.maximum(room.velocity_m_s[0, ..., 0], 0).sum()), float(room.temperature_k[0].max())
-
-    flow, warmest_k = supplied(found)
-    true_flow, true_warmest_k = supplied(truth)
-    # Entered 2 K too warm and 20 % too fast; marches this short leave a tenth of a kelvin and a few per cent.
-    assert warmest_k == pytest.approx(true_warmest_k, abs=0.2)
-    assert flow == pytest.approx(true_flow, rel=0.05)
+    (supply,) = (event for event in reported if "supply_1_m_s" in event)
+    excess_k, speed_m_s = supply["supply_1_excess_k"], supply["supply_1_m_s"]
+    # Entered 12 K and 0.48 m/s; it has 10 K and 0.4 m/s. Ten cells an edge find the temperature and the heat, and
+    # make good a part of the speed only.
+    assert excess_k == pytest.approx(10.0, abs=0.5)
+    assert excess_k * speed_m_s == pytest.approx(4.0, rel=0.15)
+    assert abs(speed_m_s - 0.4) < 0.75 * 0.08
     # The operator is told.
     assert any("than the 305.15 K entered" in note for note in found.notes)
     assert found.temperature_std_k.min() > 0
@@ -223,18 +241,19 @@ def test_another_closure_is_tried_where_it_leaves_less_of_the_images(
     assert promising_closure(where(0.5, 0.0), background.coarse) == wanted
 
 
-@pytest.mark.parametrize("low_m", [1.2, 1.0, None])
+# Panels on no strip that is searched, nor as wide or as deep as one; the last is a room without any.
+@pytest.mark.parametrize("panel", [((1.27, 0.7), (1.75, 1.1)), ((0.93, 0.9), (1.37, 1.4)), None])
 def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothing_else_explains(
-    low_m: float | None,
+    panel: tuple[tuple[float, float], tuple[float, float]] | None,
 ):
     openings = scene(replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))).boundary[:2]
     heaters: tuple[Heater, ...] = ()
-    if low_m is not None:
-        patch = Patch(wall="z_min", lower_m=(low_m, 0.8), upper_m=(low_m + 0.4, 1.2))
+    if panel is not None:
+        patch = Patch(wall="z_min", lower_m=panel[0], upper_m=panel[1])
         heaters = (Heater(patch=patch, temperature_k=343.15),)
     there = replace(scene(SUPPLY), boundary=(*openings, *heaters))
     entered = replace(there, boundary=openings)
-    problem = measured(entered, solve_room(Problem(there, ()), SETTINGS), 1e-5)
+    problem = measured(entered, true_room(there), 1e-5)
     problem = Problem(problem.scene, problem.shifts)
     reported: list[dict] = []
     found = solve_room(problem, SETTINGS, Watch(lambda row, growing: reported.append(row)))
@@ -242,39 +261,34 @@ def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothi
     asked_k = [event["suspected_k"] for event in reported if "suspected_k" in event]
     said = [note for note in found.notes if "heat that is not in the scene" in note]
     assert len(asked_k) == len(said) == len(heaters)
-    if low_m is not None:
-        assert asked_k[0] >= 30.0
-        assert f"at x = {low_m:.1f} to {low_m + 0.4:.1f} m" in said[0]
+    if panel is not None:
+        # The strip that is named covers most of the panel's width.
+        low_m, high_m = (float(n) for n in re.findall(r"at x = ([\d.]+) to ([\d.]+) m", said[0])[0])
+        covered_m = min(high_m, panel[1][0]) - max(low_m, panel[0][0])
+        assert covered_m > 0.6 * (panel[1][0] - panel[0][0])
 
 
-@pytest.mark.parametrize("deviations", [-2.0, 0.0, 1.0])
-def test_what_a_stated_heater_gives_off_is_found_by_marches(truth: Solution, deviations: float):
+# Between the steps that are tried, and on another grid.
+@pytest.mark.parametrize("deviations", [-1.7, 0.1, 1.3])
+def test_what_a_stated_heater_gives_off_is_found_by_marches(deviations: float):
     supply = replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))
     panel = Heater(patch=Patch(wall="z_min", lower_m=(1.0, 0.6), upper_m=(1.6, 1.4)), temperature_k=333.15)
     stated = replace(scene(supply), boundary=(*scene(supply).boundary, panel))
     background = background_of(Problem(stated, ()), SETTINGS, Marches())
     own = background.prior.names().index("heater_log_heat[0]")
-    vector = np.zeros(len(background.prior.active()))
-    vector[own] = deviations
-    vertices = (SETTINGS.vertices,) * 3
-    there = march_under(
-        background.coarse,
-        background.prior.parameters(vector),
-        background.base.flow.last,
-        60.0,
-        vertices,
-        Marches(),
+    data = observations(
+        Problem(stated, measured(stated, true_room(stated, deviations), 1e-5).shifts),
+        (SETTINGS.vertices,) * 3,
     )
-    warmed = eqx.tree_at(lambda s: s.temperature_k, truth, there.fields.excess_k + 293.15)
-    data = observations(Problem(stated, measured(stated, warmed, 1e-5).shifts), vertices)
     nothing = np.zeros(len(data.values()[0]))
 
-    found, room = heaters_by_march(
+    found, better = heaters_by_march(
         background.coarse, background.prior, data, background.base, nothing, SETTINGS, Marches()
     )
-
-    np.testing.assert_allclose(found, vector)
-    assert (misfit_ratio(data, room, background.base) < 0.5) == (deviations != 0.0)
+    # A factor of 1.8 is one deviation.
+    assert found[own] == pytest.approx(deviations, abs=0.75)
+    assert not np.delete(found, own).any()
+    assert (misfit_ratio(data, better, background.base) < 1.0) == bool(found[own])
 
 
 def test_a_level_that_thermometers_moved_is_doubted_by_half_of_that(truth: Solution):
