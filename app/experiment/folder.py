@@ -4,6 +4,7 @@
     calibration/bundle.json    models, with units, date, quality
     captures/<id>/             manifest.json (written last), reference.tif or flow.tif
     results/<id>/              result.nc, report.html, manifest.json (written last)
+    checkpoint/                a reconstruction that was stopped: `airlens reconstruct` goes on from it
     truth.npz                  simulated experiments only: the room that the twin looks at
 
 A folder without a manifest is an interrupted one: listed as such, never used as a result.
@@ -53,6 +54,11 @@ class Experiment:
     def results_folder(self) -> Path:
         """One folder a result."""
         return self.folder / "results"
+
+    @property
+    def checkpoint_folder(self) -> Path:
+        """What `airlens reconstruct` goes on from; gone when it has ended."""
+        return self.folder / "checkpoint"
 
     def file(self, name: str) -> Path:
         """A file that the settings name, inside the folder. Raises BadInputError for a path outside it."""

@@ -13,7 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from core.solve.checkpoint import decode
+from core.checkpoint import decode
 from tests.app.jobs.test_resume import Attempts
 
 

@@ -6,16 +6,19 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.flatten_util import ravel_pytree
 
 from core.estimate.alternatives import promising_closure
 from core.estimate.forward_runs import Derivatives, march_under
 from core.estimate.heaters import heaters_by_march
 from core.estimate.levenberg_marquardt import fine_search
+from core.estimate.marches import Marches
 from core.estimate.observation import observations
 from core.estimate.parameter_fit import Background, coarse_fit, fine_fit
+from core.estimate.parameter_names import by_name
 from core.estimate.parameter_step import misfit_ratio
 from core.estimate.posterior import Analysis, solution
-from core.estimate.prior import room_prior
+from core.estimate.prior import Prior, room_prior
 from core.geometry import Box, looking_along_y
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
@@ -28,6 +31,7 @@ from core.solve.room import (
     fitted_room,
     solve_room,
 )
+from core.watch import Watch
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(2.0, 2.0, 2.0))
 SUPPLY = Inlet(
@@ -38,6 +42,19 @@ SUPPLY = Inlet(
 SETTINGS = RoomSettings(
     cells=10, coarse_cells=8, vertices=12, settle_s=90.0, restart_s=30.0, refine_s=30.0, final_s=30.0
 )
+
+
+def telling(told: list[dict]) -> Marches:
+    """Marches whose rows are put into a list."""
+    return Marches(Watch(lambda row, growing: told.append(dict(row))))
+
+
+def deviations(prior: Prior, row: dict) -> np.ndarray:
+    """Told parameters in deviations from their priors."""
+    std = np.asarray(ravel_pytree(prior.std)[0], float)[prior.active()]
+    stated = by_name(prior, np.zeros(len(std)))
+    moved = [np.log(row[name]) if "ratio" in name else row[name] - start for name, start in stated.items()]
+    return np.array(moved) / std
 
 
 def scene(supply: Inlet, flow: FlowModel = FlowModel(transport="given", viscosity_m2_s=2e-3)) -> Scene:
@@ -71,7 +88,7 @@ def true_room(where: Scene, heat: float = 0.0) -> Solution:
     vector = np.array([heat if name.startswith("heater_log_heat") else 0.0 for name in prior.names()])
     parameters = prior.parameters(vector)
     start = fine.at_rest(fine.model(parameters), np.zeros(fine.grid.cells[2]))
-    run = march_under(fine, parameters, start, 120.0, (TRUE_VERTICES,) * 3, lambda _: None)
+    run = march_under(fine, parameters, start, 120.0, (TRUE_VERTICES,) * 3, Marches())
     fields, axis_m = run.fields, np.linspace(0.0, 2.0, TRUE_VERTICES)
     kelvin = 293.15 + fields.excess_k
     return Solution(axis_m, axis_m, axis_m, kelvin, fields.pressure_m2_s2, fields.velocity_m_s)
@@ -107,7 +124,7 @@ def test_images_repair_a_supply_that_was_entered_wrongly():
     problem = measured(scene(wrong), true_room(scene(SUPPLY)), 1e-5)
 
     reported: list[dict] = []
-    found = solve_room(problem, SETTINGS, on_event=reported.append)
+    found = solve_room(problem, SETTINGS, Watch(lambda row, growing: reported.append(row)))
 
     (supply,) = (event for event in reported if "supply_1_m_s" in event)
     excess_k, speed_m_s = supply["supply_1_excess_k"], supply["supply_1_m_s"]
@@ -125,14 +142,14 @@ def test_images_repair_a_supply_that_was_entered_wrongly():
 def test_derivatives_that_point_the_wrong_way_leave_a_room_no_worse_than_stated(truth: Solution):
     wrong = replace(SUPPLY, temperature_k=304.15, velocity_m_s=(0.44, 0.0, 0.0))
     problem = measured(scene(wrong), truth, 1e-5)
-    background = background_of(problem, SETTINGS, lambda _: None)
+    background = background_of(problem, SETTINGS, Marches())
     data = observations(problem, (SETTINGS.vertices,) * 3)
     turned = eqx.tree_at(lambda d: d.steps, background.derivatives, -background.derivatives.steps)
     reported: list[dict] = []
     vector = np.zeros(len(background.prior.active()))
     settings = replace(SETTINGS, rounds=2, final_s=10.0)
     best = fine_fit(
-        background.fine, background.prior, data, vector, background.first, turned, settings, reported.append
+        background.fine, background.prior, data, vector, background.first, turned, settings, telling(reported)
     )
 
     assert max(event.get("misfit_left", 0.0) for event in reported) > 1.15
@@ -144,7 +161,7 @@ def unknown_walls(truth: Solution) -> Background:
     """The room of which nobody stated the walls."""
     where = scene(SUPPLY)
     openings = tuple(part for part in where.boundary if not isinstance(part, Wall))
-    return background_of(measured(replace(where, boundary=openings), truth, 1e-5), SETTINGS, lambda _: None)
+    return background_of(measured(replace(where, boundary=openings), truth, 1e-5), SETTINGS, Marches())
 
 
 def test_derivatives_are_made_again_where_unknown_walls_have_moved(unknown_walls: Background):
@@ -159,7 +176,7 @@ def test_derivatives_are_made_again_where_unknown_walls_have_moved(unknown_walls
         return background.derivatives
 
     # A coarse room's own errors would move walls that nobody knows.
-    assert not np.any(coarse_fit(background, data, settings, reported.append)[0])
+    assert not np.any(coarse_fit(background, data, settings, telling(reported))[0])
     fine_search(
         background.fine,
         background.prior,
@@ -168,14 +185,14 @@ def test_derivatives_are_made_again_where_unknown_walls_have_moved(unknown_walls
         background.derivatives,
         renewed,
         settings,
-        reported.append,
+        telling(reported),
     )
 
     rounds = [event for event in reported if "round" in event]
     assert len(moved_to) == 1
     # After the second round, from the room that was nearest to the data by then.
     kept = [event for event in rounds[:2] if event["misfit_left"] < 1.0][-1]
-    np.testing.assert_allclose(moved_to[0], [kept[name] for name in background.prior.names()])
+    np.testing.assert_allclose(moved_to[0], deviations(background.prior, kept), atol=1e-6)
 
 
 def test_a_search_whose_derivatives_mislead_comes_back_and_learns(unknown_walls: Background):
@@ -192,11 +209,11 @@ def test_a_search_whose_derivatives_mislead_comes_back_and_learns(unknown_walls:
         turned,
         lambda _: turned,
         settings,
-        reported.append,
+        telling(reported),
     )
 
     rounds = [event for event in reported if "round" in event]
-    first, second = ([event[name] for name in background.prior.names()] for event in rounds)
+    first, second = (deviations(background.prior, event) for event in rounds)
     assert rounds[0]["misfit_left"] > 1.0
     # The second step starts from where the first did, is shorter, and does not go the same way again.
     assert np.abs(second).max() <= 0.5 * np.abs(first).max() + 1e-9
@@ -209,8 +226,8 @@ def test_another_closure_is_tried_where_it_leaves_less_of_the_images(
     truth: Solution, transport: Literal["auto", "k_epsilon"], wanted: str | None
 ):
     problem = measured(scene(SUPPLY, FlowModel(transport=transport)), truth, 1e-5)
-    background = background_of(problem, SETTINGS, lambda _: None)
-    fitted = fitted_room(background, problem, SETTINGS, lambda _: None)
+    background = background_of(problem, SETTINGS, Marches())
+    fitted = fitted_room(background, problem, SETTINGS, Marches())
     # As if either room were the truth itself, a share of it, or no room at all.
     true_k = np.asarray(truth.temperature_k - 293.15)
 
@@ -239,7 +256,7 @@ def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothi
     problem = measured(entered, true_room(there), 1e-5)
     problem = Problem(problem.scene, problem.shifts)
     reported: list[dict] = []
-    found = solve_room(problem, SETTINGS, on_event=reported.append)
+    found = solve_room(problem, SETTINGS, Watch(lambda row, growing: reported.append(row)))
 
     asked_k = [event["suspected_k"] for event in reported if "suspected_k" in event]
     said = [note for note in found.notes if "heat that is not in the scene" in note]
@@ -257,7 +274,7 @@ def test_what_a_stated_heater_gives_off_is_found_by_marches(deviations: float):
     supply = replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))
     panel = Heater(patch=Patch(wall="z_min", lower_m=(1.0, 0.6), upper_m=(1.6, 1.4)), temperature_k=333.15)
     stated = replace(scene(supply), boundary=(*scene(supply).boundary, panel))
-    background = background_of(Problem(stated, ()), SETTINGS, lambda _: None)
+    background = background_of(Problem(stated, ()), SETTINGS, Marches())
     own = background.prior.names().index("heater_log_heat[0]")
     data = observations(
         Problem(stated, measured(stated, true_room(stated, deviations), 1e-5).shifts),
@@ -266,7 +283,7 @@ def test_what_a_stated_heater_gives_off_is_found_by_marches(deviations: float):
     nothing = np.zeros(len(data.values()[0]))
 
     found, better = heaters_by_march(
-        background.coarse, background.prior, data, background.base, nothing, SETTINGS, lambda _: None
+        background.coarse, background.prior, data, background.base, nothing, SETTINGS, Marches()
     )
     # A factor of 1.8 is one deviation.
     assert found[own] == pytest.approx(deviations, abs=0.75)
@@ -276,7 +293,7 @@ def test_what_a_stated_heater_gives_off_is_found_by_marches(deviations: float):
 
 def test_a_level_that_thermometers_moved_is_doubted_by_half_of_that(truth: Solution):
     problem = measured(scene(SUPPLY), truth, 1e-5)
-    fitted = fitted_room(background_of(problem, SETTINGS, lambda _: None), problem, SETTINGS, lambda _: None)
+    fitted = fitted_room(background_of(problem, SETTINGS, Marches()), problem, SETTINGS, Marches())
     # As if parameters alone had made a room 2 K colder than the plane says.
     colder = eqx.tree_at(lambda s: s.before.fields.excess_k, fitted, fitted.before.fields.excess_k - 2.0)
     own, doubted = (solution(s, 0.0, use_images=True) for s in (fitted, colder))
