@@ -38,6 +38,6 @@ def _readable(name: str, prior: Prior) -> str:
     n = int(index or 0)
     what, of = _WORDS[stem]
     wall = WALLS[n % len(WALLS)]
-    if prior.alike() and wall in FITTED_AS_ONE:
+    if prior.front_and_back_tied() and wall in FITTED_AS_ONE:
         wall = " and ".join(FITTED_AS_ONE)
     return f"{what.format(n=n + 1, wall=wall)}: {of}"
