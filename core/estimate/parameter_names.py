@@ -5,7 +5,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Float
 
 from core.estimate.prior import FITTED_AS_ONE, Prior
-from core.room.room_grid import WALLS
+from core.geometry import WALLS
 
 _ABOVE = "temperature above ambient (K)"
 _WORDS = {

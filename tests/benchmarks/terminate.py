@@ -2,9 +2,9 @@
 
     python -m tests.benchmarks.terminate EXPERIMENT --preset standard --times 10
 
-A real worker on an experiment (made by `airlens simulate`). It runs once undisturbed, then again with a signal at a
-random moment of that time, begun anew after each. One JSON line a signal, and one at the end. `--cells` makes a room's
-grids smaller where 48^3 would take too long, and sets the cells of `grid`.
+A real worker on an experiment (made by `airlens simulate`). It runs undisturbed, then with a signal at a random
+moment of that time, begun anew after each. One JSON line a signal, and one at the end. `--cells` makes a room's grids
+smaller where 48^3 would take too long, and sets the cells of `grid`.
 """
 
 import argparse
