@@ -11,6 +11,7 @@ from app.experiment.results import read_result
 from app.files.provenance import sha256
 from app.pipeline import reconstruct
 from app.report.page import report_again
+from core.watch import Watch
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,8 @@ def disturbed(experiment, tmp_path_factory):
             }
             (later / "manifest.json").write_text(json.dumps(manifest))
 
-    return used, reconstruct(copy, "draft", on_stage=another_capture, into=into)
+    watch = Watch(lambda row, growing: another_capture(str(row["doing"])))
+    return used, reconstruct(copy, "draft", watch=watch, into=into)
 
 
 def test_a_capture_finished_meanwhile_is_not_the_one_that_was_used(disturbed):
