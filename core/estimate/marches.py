@@ -52,8 +52,8 @@ class Marches:
         return told
 
     def record(self, row: Row) -> None:
-        """Tell a row, and keep it in the history."""
-        self.history.append({**self.tell(row)})
+        """Tell a row, and keep it in the history without its share, which depends on what threads do beside."""
+        self.history.append({name: value for name, value in self.tell(row).items() if name != "share"})
 
     def run(
         self,

