@@ -79,13 +79,7 @@ def test_a_complete_step_is_put_to_use_and_retaking_a_view_leaves_it_until_the_n
     assert len(folder.record("camera").boards) == len(CAMERA_PLAN) - 1
     assert in_use(experiment) != before
 
-
-def test_a_given_calibration_has_no_record_behind_it(experiment):
-    guided = guide_of(experiment)
-    while guided.wanted() is not None:
-        guided.take()
-    guided.finish()
-    folder = CalibrationFolder(experiment.folder)
     assert measured_model(folder) is not None
     calibrate_simulated(experiment)
+    # A given calibration has no record behind it.
     assert measured_model(folder) is None
