@@ -17,6 +17,7 @@ from app.errors import BadInputError
 from app.experiment.calibration import read_bundle
 from app.experiment.folder import ExperimentSettings, open_experiment
 from app.files.durable import write_text
+from app.rig.conditions import Conditions, known_pairs
 from calibration.bundle import Bundle, to_json
 from calibration.errors import CalibrationError
 from calibration.model import Model
@@ -126,6 +127,12 @@ class CalibrationFolder:
         )
         self.save_bundle(bundle)
         return bundle
+
+    def note(self, conditions: Conditions) -> None:
+        """Write the conditions into the bundle, if there is one; what is not known leaves what was."""
+        known = known_pairs(conditions)
+        if known and (self.folder / "bundle.json").exists():
+            self.save_bundle(dataclasses.replace(self.bundle(), **known))
 
     def save_bundle(self, bundle: Bundle) -> None:
         """Write bundle.json durably."""

@@ -15,7 +15,7 @@ from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.calibrate.pictures import StoppedError
 from app.errors import AirlensError, BadInputError
 from app.experiment.folder import Experiment
-from app.rig.conditions import Conditions, conditions_of, note_conditions
+from app.rig.conditions import Conditions, conditions_of
 from app.rig.live_camera import LiveCamera
 from app.rig.open import open_camera, open_stage, panel_of
 from app.rig.stage import RealStage, Stage, Task, UnopenedStage
@@ -150,7 +150,7 @@ class CalibrationDesk:
             issues = guided.take(self._progress, self._abort.is_set)
             in_use = guided.finish()
         if in_use:
-            note_conditions(CalibrationFolder(experiment.folder), conditions_of(experiment.settings, told))
+            CalibrationFolder(experiment.folder).note(conditions_of(experiment.settings, told))
         return issues
 
     @contextmanager

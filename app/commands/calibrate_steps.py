@@ -55,7 +55,7 @@ from app.calibrate.steps import (
 from app.calibrate.summary import lines, summary
 from app.calibrate.terminal import LiveOptions, run_live
 from app.errors import AirlensError, BadInputError
-from app.rig.conditions import Conditions, conditions_of, note_conditions
+from app.rig.conditions import Conditions, conditions_of
 from calibration.bundle import Bundle
 from calibration.errors import CalibrationError
 from calibration.strict import encode
@@ -235,14 +235,14 @@ def response(
     if images is None:
         plan = LivePlan(StepName.response, camera, None, response_frames=response_frames, settle_s=settle_s)
         run_live(experiment, plan, LiveOptions(every_s, screen, port))
-        note_conditions(folder, conditions_of(folder.settings(), known))
+        folder.note(conditions_of(folder.settings(), known))
         bundle = folder.bundle()
     else:
         if bits is None:
             raise BadInputError("Give --bits with --images: the bits of the camera that took them.")
         full_scale(bits)
         bundle = calibrate_response(folder, camera, images, bits)
-        note_conditions(folder, known)
+        folder.note(known)
     _echo_response(bundle, camera, as_json)
 
 
@@ -349,7 +349,7 @@ def run(
         raise BadInputError(str(error)) from error
     started = folder.started(done.record.camera)
     if started is None:
-        note_conditions(folder, known)
+        folder.note(known)
     content: dict[str, Any] = summary(done, time.perf_counter() - began)
     typer.echo(json.dumps(content, indent=1) if as_json else "\n".join(lines(content)))
     if started is not None:
