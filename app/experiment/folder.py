@@ -11,8 +11,9 @@ A folder without a manifest is an interrupted one: listed as such, never used as
 """
 
 import json
+import time
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,6 +22,8 @@ from app.experiment.rig_settings import RigSettings
 from app.files.durable import write_json, write_text
 from app.files.toml import Strict, read_toml, to_toml
 from core.scene import Scene
+
+_MOMENT = "%Y%m%dT%H%M%S"
 
 
 class ExperimentSettings(Strict):
@@ -114,13 +117,22 @@ def save_settings(folder: Path, settings: ExperimentSettings) -> Experiment:
 
 
 def new_id(parent: Path, stem: str) -> str:
-    """A fresh, sortable folder name: time, then what it is."""
-    moment = datetime.now(UTC).strftime("%Y%m%dT%H%M%S")
-    candidate, number = f"{moment}-{stem}", 1
-    while (parent / candidate).exists():
-        number += 1
-        candidate = f"{moment}-{number:02d}-{stem}"
-    return candidate
+    """A fresh folder name: time, then what it is. It sorts after every name that is there.
+
+    Two within a second, and one after the clock was set back, are named by the second after the newest.
+    """
+    moment = datetime.fromtimestamp(int(time.time()), UTC)
+    there = [found for path in parent.glob("*-*") if (found := _moment_of(path.name)) is not None]
+    if there:
+        moment = max(moment, max(there) + timedelta(seconds=1))
+    return f"{moment.strftime(_MOMENT)}-{stem}"
+
+
+def _moment_of(name: str) -> datetime | None:
+    try:
+        return datetime.strptime(name.partition("-")[0], _MOMENT).replace(tzinfo=UTC)
+    except ValueError:
+        return None
 
 
 def finished(parent: Path) -> list[Path]:

@@ -35,8 +35,7 @@ def disturbed(experiment, tmp_path_factory):
             }
             (later / "manifest.json").write_text(json.dumps(manifest))
 
-    watch = Watch(lambda row, growing: another_capture(str(row["doing"])))
-    return used, reconstruct(copy, "draft", watch=watch, into=into)
+    return used, reconstruct(copy, "draft", watch=Watch(another_capture), into=into)
 
 
 def test_a_capture_finished_meanwhile_is_not_the_one_that_was_used(disturbed):

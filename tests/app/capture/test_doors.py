@@ -94,7 +94,7 @@ def by_service(experiment: Experiment) -> None:
     desk = CaptureDesk(live, lambda kind, body: None)
     try:
         desk.start(experiment, order_of(NewCapture.model_validate(ASKED | {"role": "reference"})))
-        desk._thread.join(200)
+        desk.wait(200)
         assert (desk.status.state, desk.status.burst, desk.status.reason) == ("finished", 2, "")
     finally:
         live.close()
