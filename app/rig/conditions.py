@@ -58,4 +58,4 @@ def note_conditions(calibration: CalibrationFolder, conditions: Conditions) -> N
         return
     known = known_pairs(conditions)
     if known:
-        calibration.save_bundle(dataclasses.replace(calibration.bundle(), **known))
+        calibration.change_bundle(lambda bundle: dataclasses.replace(bundle, **known))
