@@ -8,8 +8,6 @@ from typing import Any
 from pydantic_core import from_json
 
 from app.errors import AirlensError, BadInputError
-from calibration.errors import CalibrationError
-from core.setting import SettingError
 
 
 @contextlib.contextmanager
@@ -23,9 +21,13 @@ def reading(source: Path | str, what_to_do: str) -> Iterator[None]:
         yield
     except AirlensError:
         raise
-    except (CalibrationError, SettingError) as error:
-        raise BadInputError(str(error)) from error
     except Exception as error:
+        # Imported here: a client that parses answers loads nothing of the science.
+        from calibration.errors import CalibrationError
+        from core.setting import SettingError
+
+        if isinstance(error, CalibrationError | SettingError):
+            raise BadInputError(str(error)) from error
         raise BadInputError(f"{source} cannot be read ({_in_words(error)}). {what_to_do}") from error
 
 

@@ -55,7 +55,8 @@ def abort_capture(given: Given, wanted: Abort) -> DeskResource:
 @router.post("/experiments/{experiment}/captures", status_code=202)
 def start_capture(given: Given, experiment: Identifier, new: NewCapture) -> DeskResource:
     """Begin a capture; it goes on when the browser is closed."""
-    return DeskResource.of(given.desk.start(given.folders.open(experiment), order_of(new)))
+    found = given.confirmed.check(given.folders.open(experiment))
+    return DeskResource.of(given.desk.start(found, order_of(new)))
 
 
 def order_of(new: NewCapture) -> Order:
