@@ -291,7 +291,7 @@ class Client:
         return self._ask(AddressesResource, "GET", f"/experiments/{experiment}/addresses")
 
     def confirm_addresses(self, experiment: str, addresses: Sequence[str]) -> AddressesResource:
-        """Confirm, once, that an experiment may open these: all that it names."""
+        """Confirm, once, that an experiment may open these."""
         body = {"addresses": list(addresses)}
         return self._ask(AddressesResource, "PUT", f"/experiments/{experiment}/addresses", body)
 

@@ -50,7 +50,7 @@ def _serve(
     port: int,
     host: str,
     renew_token: bool,
-    tls: Tls | None,
+    tls: "Tls | None",
     public_url: str | None,
     as_json: bool,
 ) -> None:

@@ -30,7 +30,9 @@ def open_projector(url: str, *, password: str = "", journal: Path | None = None)
         parts = urlsplit(url)
         (parts.hostname or "").encode("idna")
     except ValueError as error:
-        raise DeviceSettingError(f"{url!r} is no address ({error}). Write it as pjlink://192.168.1.5.") from None
+        raise DeviceSettingError(
+            f"{url!r} is no address ({error}). Write it as pjlink://192.168.1.5."
+        ) from None
     if parts.scheme not in DIALECTS or not (parts.path or parts.hostname):
         raise DeviceSettingError(
             f"{url!r} names no projector; expected DIALECT:/dev/ttyUSB0 or DIALECT://address, "

@@ -21,6 +21,6 @@ class AddressesResource(Strict):
 
 
 class ConfirmAddresses(Strict):
-    """The addresses as they were shown to the operator, all of them."""
+    """The addresses as they were shown to the operator."""
 
     addresses: list[Annotated[str, Field(max_length=1000)]] = Field(max_length=10)

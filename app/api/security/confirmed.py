@@ -40,16 +40,17 @@ class Confirmed:
         return experiment
 
     def confirm(self, experiment: Experiment, addresses: list[str]) -> None:
-        """Keep that the experiment may open these. Raises ApiError when they are not the ones it names."""
+        """Keep that the experiment may open these too. Raises ApiError when it names another one."""
         named = experiment.settings.rig.addresses
-        if sorted(addresses) != sorted(named):
+        if not set(addresses) <= set(named):
             raise ApiError(
                 "conflict",
                 f"The experiment names {', '.join(named) or 'no device'}; other addresses were confirmed.",
                 "Look at them again.",
             )
         with self._lock:
-            write_json(self._path, self._read() | {experiment.folder.name: addresses})
+            known = sorted({*addresses, *self.of(experiment).intersection(named)})
+            write_json(self._path, self._read() | {experiment.folder.name: known})
 
     def _read(self) -> dict[str, object]:
         try:

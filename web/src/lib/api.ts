@@ -3,7 +3,7 @@
 import type { paths, Problem as Told } from "./schema";
 
 /** What the page needs of a refusal; what lies beyond the service has no more. */
-export type Problem = Pick<Told, "code" | "title" | "detail" | "status">;
+export type Problem = Pick<Told, "code" | "title" | "detail" | "status" | "current">;
 
 export class ProblemError extends Error {
   constructor(readonly problem: Problem) {
@@ -42,9 +42,16 @@ export type Body<R extends Request> =
 export type Answer<R extends Request> = Content<Good<Operation<R>>>;
 type Content<A> = [A] extends [never] ? undefined : A extends { content: { "application/json": infer T } } ? T : never;
 
-/** Sends a request and returns its answer. Throws a ProblemError. */
-export async function ask<R extends Request>(request: R, given: Given<R>, body?: Body<R>): Promise<Answer<R>> {
-  const answer = await reach(verbOf(request), address(request, given), body);
+/** Sends a request and returns its answer; with a revision, only while nobody else changed the resource.
+    Throws a ProblemError. */
+export async function ask<R extends Request>(
+  request: R,
+  given: Given<R>,
+  body?: Body<R>,
+  revision?: string,
+): Promise<Answer<R>> {
+  const headers: Record<string, string> = revision === undefined ? {} : { "If-Match": `"${revision}"` };
+  const answer = await reach(verbOf(request), address(request, given), body, headers);
   return (answer.status === 204 ? undefined : await answer.json()) as Answer<R>;
 }
 
