@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic_core import from_json
 
-from app.errors import AirlensError, BadInputError
+from app.errors import AirlensError, BadInputError, foreseen
 
 
 @contextlib.contextmanager
@@ -22,11 +22,7 @@ def reading(source: Path | str, what_to_do: str) -> Iterator[None]:
     except AirlensError:
         raise
     except Exception as error:
-        # Imported here: a client that parses answers loads nothing of the science.
-        from calibration.errors import CalibrationError
-        from core.setting import SettingError
-
-        if isinstance(error, CalibrationError | SettingError):
+        if foreseen(error):
             raise BadInputError(str(error)) from error
         raise BadInputError(f"{source} cannot be read ({_in_words(error)}). {what_to_do}") from error
 

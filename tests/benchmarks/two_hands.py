@@ -123,7 +123,14 @@ def bodge_capture(folder: Path) -> str:
     image = np.full((8, 8), 0.5, np.float32)
     path = folder / "captures" / "c1" / "reference.tif"
     write_image(path, BurstImage(image, image, 1))
-    view = {"file": path.name, "sha256": sha256(path), "frames": 1, "camera": {}, "verdicts": [], "settings": []}
+    view = {
+        "file": path.name,
+        "sha256": sha256(path),
+        "frames": 1,
+        "camera": {},
+        "verdicts": [],
+        "settings": [],
+    }
     write_manifest(folder / "captures" / "c1", {"role": "reference", "complete": True, "views": [view]})
     return "c1"
 
