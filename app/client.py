@@ -6,7 +6,7 @@ with Client("http://127.0.0.1:8765/#token=...") as airlens:
 """
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
@@ -26,6 +26,7 @@ from app.api.models.jobs import Curves, JobResource
 from app.api.models.problem import MEDIA_TYPE, Problem
 from app.api.models.projector import ProjectorResource, WireLine
 from app.api.models.results import ComparisonResource, Form, PresetResource, ResultLine, ResultResource
+from app.api.models.rigs import AddressesResource
 from app.api.models.screen import PatternName, ScreenResource
 from app.api.models.shift import ShiftResource
 from app.api.models.uploads import Upload
@@ -249,10 +250,12 @@ class Client:
         """End the running capture within a frame."""
         return self._ask(DeskResource, "POST", "/captures/running/abort", {"discard": discard})
 
-    def annotate_capture(self, experiment: str, capture: str, notes: str) -> CaptureResource:
-        """Write notes beside a capture."""
+    def annotate_capture(
+        self, experiment: str, capture: str, notes: str, revision: str | None = None
+    ) -> CaptureResource:
+        """Write notes beside a capture; with `revision`, only where nobody else did meanwhile."""
         path = f"/experiments/{experiment}/captures/{capture}"
-        return self._ask(CaptureResource, "PATCH", path, {"notes": notes})
+        return self._ask(CaptureResource, "PATCH", path, {"notes": notes}, revision=revision)
 
     def discard_capture(self, experiment: str, capture: str) -> None:
         """Remove a capture with everything in it."""
@@ -274,10 +277,23 @@ class Client:
         title: str | None = None,
         information: str | None = None,
         board: Mapping[str, Any] | None = None,
+        revision: str | None = None,
     ) -> ExperimentResource:
-        """Change title, notes, or the board to calibrate with: the fields of BoardGeometry."""
+        """Change title, notes, or the board to calibrate with: the fields of BoardGeometry.
+
+        With the `revision` that was read, a change is refused where somebody else changed it meanwhile.
+        """
         body = {"title": title, "information": information, "board": board}
-        return self._ask(ExperimentResource, "PATCH", f"/experiments/{experiment}", body)
+        return self._ask(ExperimentResource, "PATCH", f"/experiments/{experiment}", body, revision=revision)
+
+    def addresses(self, experiment: str) -> AddressesResource:
+        """List the device files and hosts that an experiment names, and which are confirmed."""
+        return self._ask(AddressesResource, "GET", f"/experiments/{experiment}/addresses")
+
+    def confirm_addresses(self, experiment: str, addresses: Sequence[str]) -> AddressesResource:
+        """Confirm, once, that an experiment may open these."""
+        body = {"addresses": list(addresses)}
+        return self._ask(AddressesResource, "PUT", f"/experiments/{experiment}/addresses", body)
 
     def results(self, experiment: str) -> list[ResultLine]:
         """List the results of an experiment."""
@@ -423,9 +439,16 @@ class Client:
         _check(self._http.delete(f"/uploads/{upload}"))
 
     def _ask(
-        self, kind: type[T], method: str, path: str, body: Any = None, query: dict[str, str] | None = None
+        self,
+        kind: type[T],
+        method: str,
+        path: str,
+        body: Any = None,
+        query: dict[str, str] | None = None,
+        revision: str | None = None,
     ) -> T:
-        return _read(kind, self._http.request(method, path, json=body, params=query))
+        headers = {} if revision is None else {"If-Match": f'"{revision}"'}
+        return _read(kind, self._http.request(method, path, json=body, params=query, headers=headers))
 
     def _bytes(self, path: str, query: dict[str, str] | None = None) -> httpx.Response:
         answer = self._http.get(path, params=query)

@@ -9,13 +9,18 @@ class BadInputError(AirlensError):
     """A file, option or setting that cannot be used: exit status 2."""
 
 
-def explained(error: BaseException) -> str:
-    """What a person should read of an error: a foreseen one says it itself, any other is named with its kind."""
+def foreseen(error: BaseException) -> bool:
+    """Whether an error is one of ours, which says itself what a person should read."""
     from calibration.errors import CalibrationError
     from core.setting import SettingError
     from drivers.errors import DeviceError
 
-    if isinstance(error, AirlensError | SettingError | CalibrationError | DeviceError):
+    return isinstance(error, AirlensError | SettingError | CalibrationError | DeviceError)
+
+
+def explained(error: BaseException) -> str:
+    """What a person should read of an error: a foreseen one says it itself, any other is named with its kind."""
+    if foreseen(error):
         return str(error)
     if isinstance(error, OSError) and error.strerror:
         return f"{error.strerror}: {error.filename or 'no file named'}."

@@ -9,6 +9,7 @@ from starlette.middleware import Middleware
 from app.api.page import add_page
 from app.api.resources import (
     about,
+    addresses,
     calibrations,
     captures,
     devices,
@@ -40,6 +41,7 @@ RESOURCES: tuple[APIRouter, ...] = (
     screen.router,
     shift.router,
     experiments.router,
+    addresses.router,
     calibrations.router,
     guide.router,
     captures.router,

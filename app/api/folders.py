@@ -1,13 +1,22 @@
 """Experiments below the data root, found by listing: no path is ever made from what somebody asked."""
 
+import contextlib
 import os
 import shutil
 from pathlib import Path
 
 from app.api.wire.problems import ApiError
-from app.experiment.folder import Experiment, finished, interrupted, open_experiment
-
-SETTINGS = "experiment.toml"
+from app.experiment.folder import (
+    SETTINGS_FILE,
+    Experiment,
+    finished,
+    interrupted,
+    parse_experiment,
+    revision_of,
+)
+from app.files.durable import temporary_name
+from app.files.lock import locked
+from app.files.reading import reading
 
 
 def child(parent: Path, name: str) -> Path | None:
@@ -28,29 +37,34 @@ class Folders:
     def __init__(self, data_root: Path) -> None:
         self.root = data_root / "experiments"
         self.root.mkdir(parents=True, exist_ok=True)
-        self._known: dict[str, tuple[int, Experiment]] = {}
+        self._known: dict[str, Experiment] = {}
 
     def all(self) -> list[Path]:
         """Return the experiments' folders, newest first; one that is still being made is hidden."""
-        found = (path.parent for path in self.root.glob(f"[!.]*/{SETTINGS}"))
+        found = (path.parent for path in self.root.glob(f"[!.]*/{SETTINGS_FILE}"))
         return sorted(found, key=lambda folder: folder.name, reverse=True)
+
+    def locked(self, experiment: str) -> contextlib.AbstractContextManager[None]:
+        """Hold the lock of an experiment while its files are read, changed and written back."""
+        return locked(self.folder(experiment))
 
     def folder(self, experiment: str) -> Path:
         """Return an experiment's folder. Raises ApiError when there is none."""
         found = child(self.root, experiment)
-        if found is None or not (found / SETTINGS).is_file():
+        if found is None or not (found / SETTINGS_FILE).is_file():
             raise ApiError("not_found", f"There is no experiment {experiment!r}.")
         return found
 
     def open(self, experiment: str) -> Experiment:
         """Return an experiment. Raises ApiError when there is none."""
         folder = self.folder(experiment)
-        written_ns = (folder / SETTINGS).stat().st_mtime_ns
+        with reading(folder / SETTINGS_FILE, "Correct the file."):
+            content = (folder / SETTINGS_FILE).read_bytes()
         known = self._known.get(experiment)
-        if known is None or known[0] != written_ns:
+        if known is None or known.revision != revision_of(content):
             # Bounded by the number of experiments; an old entry is replaced when its file is written.
-            known = self._known[experiment] = (written_ns, open_experiment(folder))
-        return known[1]
+            known = self._known[experiment] = parse_experiment(folder, content)
+        return known
 
     def item(self, experiment: str, kind: str, name: str) -> Path:
         """Return the folder of a finished capture or result. Raises ApiError."""
@@ -65,7 +79,7 @@ class Folders:
 
     def remove(self, folder: Path) -> None:
         """Remove a capture or result: first out of sight, so that a half-removed one is never used."""
-        hidden = folder.with_name(f".removed-{folder.name}")
+        hidden = temporary_name(folder)
         folder.rename(hidden)
         shutil.rmtree(hidden)
 
@@ -74,5 +88,15 @@ class Folders:
         parent = self.folder(experiment) / f"{kind}s"
         shown = [folder for folder in interrupted(parent) if not folder.name.startswith(".")]
         # Names tell seconds only; two short captures may share one.
-        done = sorted(finished(parent), key=lambda p: (p / "manifest.json").stat().st_mtime_ns, reverse=True)
-        return done, shown[::-1]
+        return sorted(finished(parent), key=_written_ns, reverse=True), shown[::-1]
+
+
+def shown_name(folder: Path) -> str:
+    """A folder's name as text; one that somebody gave bytes that are no text is shown with marks."""
+    return os.fsencode(folder.name).decode("utf-8", "replace")
+
+
+def _written_ns(folder: Path) -> int:
+    with contextlib.suppress(OSError):  # removed since it was listed
+        return (folder / "manifest.json").stat().st_mtime_ns
+    return 0

@@ -1,6 +1,7 @@
 """Runs the service on one address: in this thread for `airlens serve`, in another for tests and notebooks."""
 
 import contextlib
+import functools
 import socket
 import sys
 import threading
@@ -11,9 +12,11 @@ from dataclasses import dataclass
 import uvicorn
 from fastapi import FastAPI
 
+from app.api.connections import Gate, PatientProtocol
 from app.errors import AirlensError
 
 SWITCH_S = 0.001
+BACKLOG = 128
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ def listen(host: str, port: int) -> socket.socket:
     try:
         bound.bind((host, port))
         # From here on callers wait instead of being refused, however long the start takes.
-        bound.listen(128)
+        bound.listen(BACKLOG)
     except OSError as error:
         bound.close()
         raise AirlensError(
@@ -46,9 +49,13 @@ def server_of(app: FastAPI, tls: Tls | None = None) -> uvicorn.Server:
     """Return a server that says nothing of itself and logs no addresses with queries."""
     # Reads wait for the camera's thread at most so long; the default is five times that.
     sys.setswitchinterval(SWITCH_S)
+    gate = Gate()
     return uvicorn.Server(
         uvicorn.Config(
             app,
+            http=functools.partial(PatientProtocol, gate),  # type: ignore[arg-type]
+            # What is accepted at once must find files too.
+            backlog=min(BACKLOG, gate.most // 2),
             access_log=False,
             server_header=False,
             proxy_headers=False,

@@ -8,6 +8,7 @@ from starlette.requests import HTTPConnection
 
 from app.api.folders import Folders
 from app.api.security.access import Access
+from app.api.security.confirmed import Confirmed
 from app.api.security.settings import ServiceConfig
 from app.api.wire.curves import CurveCache
 from app.api.wire.feed import EventFeed
@@ -31,6 +32,7 @@ class Services:
     access: Access
     uploads: UploadStore
     folders: Folders
+    confirmed: Confirmed
     ledger: Ledger
     feed: EventFeed
     curves: CurveCache
@@ -62,6 +64,7 @@ def create_services(config: ServiceConfig) -> Services:
         Access(config),
         UploadStore(config.data_root / "uploads", uploads),
         Folders(config.data_root),
+        Confirmed(config.data_root / "service" / "confirmed.json"),
         ledger,
         EventFeed(ledger, news.catch_up),
         CurveCache(ledger),

@@ -9,6 +9,7 @@ calibration/flat-<camera>.tif      flat field, if measured
 import dataclasses
 import datetime as dt
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -16,7 +17,8 @@ from pathlib import Path
 from app.errors import BadInputError
 from app.experiment.calibration import read_bundle
 from app.experiment.folder import ExperimentSettings, open_experiment
-from app.files.durable import write_text
+from app.files.durable import make_folder, write_text
+from app.files.lock import locked
 from app.rig.conditions import Conditions, known_pairs
 from calibration.bundle import Bundle, to_json
 from calibration.errors import CalibrationError
@@ -113,30 +115,35 @@ class CalibrationFolder:
 
     def _save_model(self, model: Model) -> Bundle:
         """Put the model's parts into the bundle, with the date and the pictures' hashes."""
-        old = self.bundle()
         record = model.record
         seen = [*record.boards, *(s for s in (record.wall, record.level) if s is not None)]
         images = {s.name: s.sha256 for s in seen}
-        others = {name: sha for name, sha in old.images.items() if sha not in images.values()}
-        bundle = dataclasses.replace(
-            old.with_camera(model.camera_optics),
-            date=now(),
-            projector=model.projector_optics or old.projector,
-            wall=model.wall or old.wall,
-            images=others | images,
-        )
-        self.save_bundle(bundle)
-        return bundle
+
+        def change(old: Bundle) -> Bundle:
+            others = {name: sha for name, sha in old.images.items() if sha not in images.values()}
+            return dataclasses.replace(
+                old.with_camera(model.camera_optics),
+                date=now(),
+                projector=model.projector_optics or old.projector,
+                wall=model.wall or old.wall,
+                images=others | images,
+            )
+
+        return self.change_bundle(change)
 
     def note(self, conditions: Conditions) -> None:
         """Write the conditions into the bundle, if there is one; what is not known leaves what was."""
         known = known_pairs(conditions)
         if known and (self.folder / "bundle.json").exists():
-            self.save_bundle(dataclasses.replace(self.bundle(), **known))
+            self.change_bundle(lambda bundle: dataclasses.replace(bundle, **known))
 
-    def save_bundle(self, bundle: Bundle) -> None:
-        """Write bundle.json durably."""
-        write_text(self.folder / "bundle.json", to_json(bundle))
+    def change_bundle(self, change: Callable[[Bundle], Bundle]) -> Bundle:
+        """Replace the bundle by `change(bundle)`, durably; nobody else writes it in between."""
+        make_folder(self.folder)
+        with locked(self.folder):
+            bundle = change(self.bundle())
+            write_text(self.folder / "bundle.json", to_json(bundle))
+        return bundle
 
     def _record_path(self, camera: str) -> Path:
         return self.folder / f"record-{camera}.json"

@@ -43,21 +43,23 @@ def calibrate_response(calibration: CalibrationFolder, camera: str, folder: Path
     try:
         times = tuple(ramp) if timed else None
         response = measure_camera(camera, bursts["dark"], tuple(ramp.values()), bits, times)
-        bundle = calibration.bundle()
+        projector = None
         if len(grey) >= 4:
             top = max(grey)
             levels = tuple(level / top for level in grey)
-            curve = measure_projector(levels, tuple(grey.values()), response.dark_counts)
+            projector = measure_projector(levels, tuple(grey.values()), response.dark_counts)
             flat = flat_field(grey[top], grey[min(grey)])
             path = calibration.folder / f"flat-{camera}.tif"
             write_durably(path, lambda temporary: tifffile.imwrite(temporary, flat))
             response = dataclasses.replace(response, flat_field=path.name)
-            bundle = dataclasses.replace(bundle, projector_response=curve)
     except CalibrationError as error:
         raise BadInputError(str(error)) from error
-    bundle = dataclasses.replace(bundle.with_response(response), date=now())
-    calibration.save_bundle(bundle)
-    return bundle
+
+    def change(old: Bundle) -> Bundle:
+        curve = projector or old.projector_response
+        return dataclasses.replace(old.with_response(response), projector_response=curve, date=now())
+
+    return calibration.change_bundle(change)
 
 
 def drift_between(

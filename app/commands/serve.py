@@ -36,15 +36,33 @@ def serve(
     as_json: Annotated[bool, typer.Option("--json", help="Print the address as JSON.")] = False,
 ) -> None:
     """Serve the operator's page and the API; prints the address with its token."""
-    from app.api.factory import create_app
-    from app.api.security.settings import service_config
-    from app.api.security.token import service_token
-    from app.api.server import listen, server_of
-    from app.jobs import attended
+    from app.files.lock import alone
 
     tls = _tls(tls_certificate, tls_key)
     _check_exposure(host, expose, tls, public_url)
     root = data.resolve()
+    with alone(root / "service" / "lock", "service"):
+        _serve(root, port, host, renew_token, tls, public_url, as_json)
+
+
+def _serve(
+    root: Path,
+    port: int,
+    host: str,
+    renew_token: bool,
+    tls: "Tls | None",
+    public_url: str | None,
+    as_json: bool,
+) -> None:
+    from app.api.factory import create_app
+    from app.api.security.settings import service_config
+    from app.api.security.token import service_token
+    from app.api.server import listen, server_of
+    from app.files.durable import sweep
+    from app.jobs import attended
+
+    for left in sweep(root / "experiments"):
+        logging.getLogger("airlens").warning("removed what a killed writer left: %s", left)
     token = service_token(root, renew_token)
     bound = listen(host, port)
     port = bound.getsockname()[1]

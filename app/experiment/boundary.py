@@ -1,13 +1,14 @@
 """Files that a scene's boundary names: plane fields (NPZ) and point sensors (CSV), read strictly."""
 
 import csv
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
+from app.files.npz import read_npz
+from app.files.reading import reading
 from core.geometry import Box, face_of
 from core.problem import PlaneData, SensorData
 from core.scene import PlaneField, PointSensors, Scene
@@ -38,15 +39,10 @@ def read_sensors(experiment: Experiment, scene: Scene) -> tuple[SensorData, ...]
 def read_plane(path: Path, wall: str) -> PlaneData:
     """A plane field: the wall's two axes, T, p and u on them. Raises BadInputError."""
     first, second = ("xyz"[axis] for axis in face_of(wall).along)
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: np.asarray(file[name], np.float64) for name in (first, second, "T", "p", "u")}
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile) as error:
-        raise BadInputError(f"{path} is not a readable plane field ({error}); write it again.") from None
-    except KeyError as error:
-        raise BadInputError(
-            f"{path} has no array {error}; a plane on {wall} needs {first}, {second}, T, p and u."
-        ) from None
+    names = (first, second, "T", "p", "u")
+    what_to_do = f"A plane field on {wall} holds {first}, {second}, T, p and u; write it again."
+    with reading(path, what_to_do):
+        arrays = {n: np.asarray(a, np.float64) for n, a in read_npz(path, what_to_do, names).items()}
     shape = (len(arrays[first]), len(arrays[second]))
     for name, expected in (("T", shape), ("p", shape), ("u", (*shape, 3))):
         if arrays[name].shape != expected or not np.isfinite(arrays[name]).all():
@@ -68,11 +64,8 @@ def read_sensor_table(path: Path, scene: Scene) -> SensorData:
 
     Raises BadInputError for an unknown column, a value that is not a number, or a place outside the room.
     """
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise BadInputError(f"{path} is not a readable CSV ({error}).") from None
+    with reading(path, "Give a CSV file in UTF-8."), path.open(newline="", encoding="utf-8-sig") as file:
+        rows = list(csv.DictReader(file))
     unknown = [name for name in (rows[0] if rows else {}) if name not in _SENSOR_COLUMNS]
     if not rows or unknown:
         raise BadInputError(

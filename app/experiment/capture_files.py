@@ -18,6 +18,8 @@ from jaxtyping import Float32
 
 from app.errors import BadInputError
 from app.files.durable import write_durably
+from app.files.pictures import LARGEST_PX
+from app.files.reading import reading
 from drivers.burst import FrameRecord
 from drivers.protocols import Frame, Pixels
 
@@ -47,29 +49,29 @@ def write_image(path: Path, image: BurstImage) -> None:
 
 def read_image(path: Path) -> BurstImage:
     """Read what `write_image` wrote. Raises BadInputError when it is something else."""
-    return decode_image(path.read_bytes(), path)
+    with reading(path, "Restore the file from a copy."):
+        content = path.read_bytes()
+    return decode_image(content, path)
 
 
 def decode_image(content: bytes, path: Path) -> BurstImage:
     """The image in the bytes of a file; `path` names it in messages. Raises BadInputError."""
-    try:
+    with reading(
+        path,
+        "A capture's image is a TIFF of two pages, mean and standard deviation. Take the capture again, or "
+        "restore the file from a copy.",
+    ):
         with tifffile.TiffFile(io.BytesIO(content)) as file:
+            if any(page.aspage().size > LARGEST_PX for page in file.pages):
+                raise BadInputError(f"{path} says that it has more than {LARGEST_PX:,} pixels. Crop it.")
             mean, std = (page.asarray() for page in file.pages)
             about: dict[str, Any] = json.loads(file.pages.first.description)
-        return BurstImage(mean, std, int(about["frames"]))
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        IndexError,
-        struct.error,
-        tifffile.TiffFileError,
-    ) as error:
-        raise BadInputError(
-            f"{path} is not a capture's image ({error}); expected a TIFF of two pages, mean and standard "
-            "deviation. Take the capture again, or restore the file from a copy."
-        ) from None
+        image = BurstImage(mean, std, int(about["frames"]))
+        if image.mean.ndim != 2 or image.mean.dtype != np.float32 or image.std.shape != image.mean.shape:
+            raise BadInputError(
+                f"{path} holds {mean.dtype} of shape {mean.shape}; expected one grey picture."
+            )
+        return image
 
 
 class RawStack:

@@ -28,6 +28,7 @@ from app.experiment.capture_files import BurstImage, RawStack, decode_image, rea
 from app.experiment.folder import Experiment, parse_manifest, write_manifest
 from app.files.durable import make_folder, sync, write_json
 from app.files.provenance import sha256
+from app.files.reading import inside, reading
 from app.files.toml import to_plain
 from drivers.burst import Burst, BurstOutcome, CapturePlan
 from drivers.capture import Taken
@@ -132,11 +133,12 @@ def load_capture(folder: Path) -> Capture:
     """
     path = folder / "manifest.json"
     if path.exists():
-        text = path.read_bytes()
-        manifest = parse_manifest(text, path)
-        read = {path.name: hashlib.sha256(text).hexdigest()}
-        images = tuple(_kept_image(folder, view, read) for view in manifest["views"])
-        return Capture(folder, manifest["role"], manifest["complete"], images, manifest, read)
+        with reading(path, "Take the capture again, or restore it from a copy."):
+            text = path.read_bytes()
+            manifest = parse_manifest(text, path)
+            read = {path.name: hashlib.sha256(text).hexdigest()}
+            images = tuple(_kept_image(folder, view, read) for view in manifest["views"])
+            return Capture(folder, manifest["role"], manifest["complete"], images, manifest, read)
     partial = folder / "partial.tif"
     if not partial.exists():
         raise BadInputError(
@@ -148,7 +150,7 @@ def load_capture(folder: Path) -> Capture:
 
 def _kept_image(folder: Path, view: Mapping[str, Any], read: dict[str, str]) -> BurstImage:
     """One view's image, read once; its hash is held against the manifest's and noted in `read`."""
-    path = folder / view["file"]
+    path = inside(folder, view["file"])
     try:
         content = path.read_bytes()
     except OSError as error:

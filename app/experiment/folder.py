@@ -10,8 +10,10 @@
 A folder without a manifest is an interrupted one: listed as such, never used as a result.
 """
 
-import json
+import errno
+import hashlib
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -19,10 +21,13 @@ from typing import Any, Literal
 
 from app.errors import BadInputError
 from app.experiment.rig_settings import RigSettings
-from app.files.durable import write_json, write_text
-from app.files.toml import Strict, read_toml, to_toml
+from app.files.durable import publish_folder, staging_folder, write_json, write_text
+from app.files.reading import inside, parse_json, reading
+from app.files.toml import Strict, from_toml, to_toml
 from core.scene import Scene
 
+SETTINGS_FILE = "experiment.toml"
+WHAT_TO_DO = "Remove the folder, or restore it from a copy."
 _MOMENT = "%Y%m%dT%H%M%S"
 
 
@@ -38,10 +43,11 @@ class ExperimentSettings(Strict):
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment folder and its settings."""
+    """An experiment folder and its settings. `revision` tells one content of experiment.toml from another."""
 
     folder: Path
     settings: ExperimentSettings
+    revision: str = ""
 
     @property
     def bundle_path(self) -> Path:
@@ -65,11 +71,7 @@ class Experiment:
 
     def file(self, name: str) -> Path:
         """A file that the settings name, inside the folder. Raises BadInputError for a path outside it."""
-        path = (self.folder / name).resolve()
-        if not path.is_relative_to(self.folder.resolve()):
-            raise BadInputError(
-                f"{name!r} points outside the experiment {self.folder}; give a file inside it."
-            )
+        path = inside(self.folder, name)
         if not path.is_file():
             raise BadInputError(
                 f"The experiment names {name!r}, but {path} does not exist. Put the file there."
@@ -97,23 +99,44 @@ class Experiment:
 
 def open_experiment(folder: Path) -> Experiment:
     """Read an experiment folder. Raises BadInputError."""
-    return Experiment(folder, read_toml(folder / "experiment.toml", ExperimentSettings))
+    path = folder / SETTINGS_FILE
+    if not path.exists():
+        raise BadInputError(
+            f"There is no {path}. Give the folder of an experiment; `airlens simulate` makes one."
+        )
+    with reading(path, "Correct the file."):
+        return parse_experiment(folder, path.read_bytes())
+
+
+def parse_experiment(folder: Path, content: bytes) -> Experiment:
+    """The experiment whose experiment.toml has this content. Raises BadInputError."""
+    path = folder / SETTINGS_FILE
+    with reading(path, "Write it in UTF-8."):
+        text = content.decode("utf-8")
+    return Experiment(folder, from_toml(text, ExperimentSettings, str(path)), revision_of(content))
+
+
+def revision_of(content: bytes) -> str:
+    """A short hash: equal for equal content only."""
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def create_experiment(folder: Path, settings: ExperimentSettings) -> Experiment:
     """Make a new experiment folder. Raises BadInputError when there already is one."""
-    if (folder / "experiment.toml").exists():
+    if (folder / SETTINGS_FILE).exists():
         raise BadInputError(
             f"{folder} already holds an experiment; give another folder, or remove this one first."
         )
-    folder.mkdir(parents=True, exist_ok=True)
     return save_settings(folder, settings)
 
 
 def save_settings(folder: Path, settings: ExperimentSettings) -> Experiment:
-    """Write experiment.toml durably."""
-    write_text(folder / "experiment.toml", to_toml(settings))
-    return Experiment(folder, settings)
+    """Write experiment.toml durably. Who read it before holds `locked(folder)` from then on."""
+    text = to_toml(settings)
+    if from_toml(text, ExperimentSettings, "experiment.toml") != settings:
+        raise BadInputError("A text holds characters that TOML cannot keep. Write it without them.")
+    write_text(folder / SETTINGS_FILE, text)
+    return Experiment(folder, settings, revision_of(text.encode()))
 
 
 def new_id(parent: Path, stem: str) -> str:
@@ -135,6 +158,24 @@ def _moment_of(name: str) -> datetime | None:
         return None
 
 
+def new_folder(parent: Path, stem: str, fill: Callable[[Path], object]) -> Path:
+    """A folder with a fresh id, which appears as a whole once `fill(folder)` is through.
+
+    Two that are made at once get two ids.
+    """
+    with staging_folder(parent / stem) as unfinished:
+        fill(unfinished)
+        while True:
+            target = parent / new_id(parent, stem)
+            try:
+                publish_folder(unfinished, target)
+            except OSError as error:
+                if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                    raise
+            else:
+                return target
+
+
 def finished(parent: Path) -> list[Path]:
     """Folders below `parent` that hold a manifest, oldest first."""
     return sorted(path.parent for path in parent.glob("[!.]*/manifest.json"))
@@ -148,23 +189,14 @@ def interrupted(parent: Path) -> list[Path]:
 def read_manifest(folder: Path) -> dict[str, Any]:
     """The manifest of a finished capture or result. Raises BadInputError when it is not JSON."""
     path = folder / "manifest.json"
-    try:
+    with reading(path, WHAT_TO_DO):
         text = path.read_bytes()
-    except OSError as error:
-        raise BadInputError(
-            f"{path} cannot be read ({error}); remove the folder, or restore it from a copy."
-        ) from None
     return parse_manifest(text, path)
 
 
 def parse_manifest(text: bytes, path: Path) -> dict[str, Any]:
-    """The manifest in the bytes of `path`. Raises BadInputError when they are not JSON."""
-    try:
-        return json.loads(text)
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise BadInputError(
-            f"{path} cannot be read ({error}); remove the folder, or restore it from a copy."
-        ) from None
+    """The manifest in the bytes of `path`. Raises BadInputError when they are not a JSON object."""
+    return parse_json(text, path, WHAT_TO_DO)
 
 
 def write_manifest(folder: Path, content: dict[str, Any]) -> None:

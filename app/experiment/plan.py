@@ -1,8 +1,8 @@
 """The plan of an experiment as it is kept, shown and sent: numbers and sentences, no computation."""
 
-import json
 from typing import TYPE_CHECKING
 
+from app.files.reading import read_json
 from app.files.toml import Strict, parse
 
 if TYPE_CHECKING:
@@ -94,4 +94,4 @@ def read_plan(experiment: "Experiment") -> Plan | None:
     path = experiment.folder / PLAN_FILE
     if not path.is_file():
         return None
-    return parse(json.loads(path.read_text(encoding="utf-8")), Plan, str(path))
+    return parse(read_json(path, "Make it again: `airlens plan`."), Plan, str(path))

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from app.errors import BadInputError
 from app.files.durable import durable_path
+from app.files.reading import reading
 from core.result import Outcome, Solution
 
 _DIMS = ("x", "y", "z")
@@ -67,7 +67,7 @@ def write_result(path: Path, solution: Solution, attributes: dict[str, str]) -> 
 
 def read_result(path: Path) -> Solution:
     """Read result.nc. Raises BadInputError for a file that is not one."""
-    try:
+    with reading(path, "Reconstruct again, or give a result.nc."):
         with xr.open_dataset(path, engine="h5netcdf") as dataset:
             data = dataset.load()
         fields: dict[str, Any] = {
@@ -76,6 +76,9 @@ def read_result(path: Path) -> Solution:
         for name, (stem, _) in _VECTORS.items():
             parts = [_component(stem, i) for i in range(3)]
             fields[name] = np.stack([data[p].to_numpy() for p in parts], -1) if parts[0] in data else None
+        shape = tuple(data.sizes[axis] for axis in _DIMS)
+        for name, values in fields.items():
+            _check(name, values, (*shape, 3) if name in _VECTORS else shape)
         return Solution(
             x_m=data["x"].to_numpy(),
             y_m=data["y"].to_numpy(),
@@ -85,10 +88,14 @@ def read_result(path: Path) -> Solution:
             notes=tuple(str(data.attrs["notes"]).splitlines()),
             **fields,
         )
-    except (OSError, KeyError, ValueError) as error:
-        raise BadInputError(
-            f"{path} is not a readable result ({error}). Reconstruct again, or give a result.nc."
-        ) from None
+
+
+def _check(name: str, values: np.ndarray | None, shape: tuple[int, ...]) -> None:
+    """NaN is no value; every field has some, and none is infinite."""
+    if values is None:
+        return
+    if values.shape != shape or np.isinf(values).any() or np.isnan(values).all():
+        raise ValueError(f"{name} has shape {values.shape}; expected finite values of shape {shape}")
 
 
 def _component(stem: str, index: int) -> str:

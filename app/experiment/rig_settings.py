@@ -87,3 +87,10 @@ class RigSettings(Strict):
     def camera_kind(self) -> str:
         """The kind of camera that is named; `none` where none is."""
         return "none" if self.camera is None else self.camera.kind
+
+    @property
+    def addresses(self) -> tuple[str, ...]:
+        """The device files and hosts that this rig opens; simulated twins open none."""
+        camera = (self.camera.device,) if isinstance(self.camera, V4l2CameraSettings) else ()
+        named = () if self.projector is None else (self.projector.url,)
+        return camera + tuple(url for url in named if not url.startswith("simulated:"))

@@ -7,6 +7,7 @@ import xarray as xr
 
 from app.errors import BadInputError
 from app.files.durable import durable_path
+from app.files.reading import reading
 from core.problem import ShiftMeasurement
 
 
@@ -38,7 +39,7 @@ def read_shifts(folder: Path) -> tuple[ShiftMeasurement, ...]:
     """Read what `write_shifts` wrote. Raises BadInputError."""
     shifts = []
     for path in sorted(folder.glob("shift-*.nc")):
-        try:
+        with reading(path, "Reconstruct again."):
             with xr.open_dataset(path, engine="h5netcdf") as dataset:
                 data = dataset.load()
             shifts.append(
@@ -49,10 +50,6 @@ def read_shifts(folder: Path) -> tuple[ShiftMeasurement, ...]:
                     window_px=int(np.asarray(data.attrs["window_px"])),
                 )
             )
-        except (OSError, KeyError, ValueError) as error:
-            raise BadInputError(
-                f"{path} is not a readable shift file ({error}); reconstruct again."
-            ) from None
     if not shifts:
         raise BadInputError(f"{folder} holds no measured shifts; reconstruct again.")
     return tuple(shifts)

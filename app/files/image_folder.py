@@ -13,6 +13,7 @@ import numpy as np
 import tifffile
 
 from app.errors import BadInputError
+from app.files.reading import reading
 
 SUFFIXES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm"}
 
@@ -69,13 +70,11 @@ def sequences(folder: Path, files: list[Path]) -> list[Sequence]:
 
 def read_grey(path: Path) -> np.ndarray:
     """One picture as a grey array in its own bit depth; colour is averaged. Raises BadInputError."""
-    try:
+    with reading(path, "Save it again or leave it out."):
         if path.suffix.lower() in (".tif", ".tiff"):
             image = tifffile.imread(path)
         else:
             image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    except (OSError, ValueError, tifffile.TiffFileError, cv2.error) as error:
-        raise BadInputError(f"{path} cannot be read ({error}); save it again or leave it out.") from error
     if image is None or image.size == 0:
         raise BadInputError(f"{path} is no picture or is cut short; save it again or leave it out.")
     if image.ndim == 3 and image.shape[-1] in (3, 4):

@@ -8,20 +8,17 @@ import tifffile
 from jaxtyping import Float32
 
 from app.errors import BadInputError
+from app.files.reading import reading
 
-_LARGEST_PX = 400_000_000
+LARGEST_PX = 400_000_000
 
 
 def read_picture(path: Path) -> Float32[np.ndarray, "rows cols"]:
     """The picture in parts of full scale (float images as they are). Raises BadInputError."""
     if not path.is_file():
         raise BadInputError(f"There is no picture {path}. Give a TIFF or PNG file.")
-    try:
+    with reading(path, "Give a TIFF or PNG; this one may be truncated. Export it again."):
         pixels = _read_tiff(path) if path.suffix.lower() in (".tif", ".tiff") else _read_png(path)
-    except (OSError, ValueError, IndexError, KeyError, tifffile.TiffFileError) as error:
-        raise BadInputError(
-            f"{path} is not a readable TIFF or PNG ({error}); it may be truncated. Export it again."
-        ) from None
     if pixels.ndim != 2:
         raise BadInputError(
             f"{path} has shape {pixels.shape}; expected one channel. Convert it to grey without rescaling."
@@ -38,7 +35,7 @@ def read_picture(path: Path) -> Float32[np.ndarray, "rows cols"]:
 def _read_tiff(path: Path) -> np.ndarray:
     with tifffile.TiffFile(path) as file:
         page = file.pages.first
-        if page.size > _LARGEST_PX:
+        if page.size > LARGEST_PX:
             raise ValueError(f"{page.size} pixels")
         return page.asarray()
 

@@ -14,6 +14,7 @@ import tomlkit
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from app.errors import BadInputError
+from app.files.reading import reading
 
 T = TypeVar("T")
 
@@ -26,15 +27,25 @@ class Strict(BaseModel):
 
 def read_toml(path: Path, kind: type[T]) -> T:
     """Parse a TOML file into `kind`. Raises BadInputError that names every wrong key or value."""
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.exists():
         raise BadInputError(
             f"There is no {path}. Give the folder of an experiment; `airlens simulate` makes one."
-        ) from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise BadInputError(f"{path} is not valid TOML ({error}). Correct the file at that place.") from None
-    return parse(data, kind, source=str(path))
+        )
+    with reading(path, "Correct the file at that place."):
+        text = path.read_text(encoding="utf-8")
+    return from_toml(text, kind, source=str(path))
+
+
+def from_toml(text: str, kind: type[T], source: str) -> T:
+    """Parse TOML text into `kind`. Raises BadInputError that names every wrong key or value."""
+    with reading(source, "Correct the file at that place."):
+        try:
+            data = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise BadInputError(
+                f"{source} is not valid TOML ({error}). Correct the file at that place."
+            ) from None
+        return parse(data, kind, source)
 
 
 def parse(data: dict[str, Any], kind: type[T], source: str) -> T:

@@ -6,8 +6,10 @@ The page asks for no data but the picture, and runs no script but its own file.
 """
 
 from pathlib import Path
+from typing import Annotated
 
 from fastapi import APIRouter, FastAPI, HTTPException
+from pydantic import Field
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.responses import FileResponse, Response
 
@@ -18,6 +20,10 @@ FOLDER = Path(__file__).parent / "page"
 POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; frame-ancestors 'none'"
 _FILES = {"page": ("kiosk.html", "text/html"), "kiosk.js": ("kiosk.js", "text/javascript")}
 _FILES["kiosk.css"] = ("kiosk.css", "text/css")
+
+
+Text = Annotated[str, Field(max_length=1000)]
+Pixels = Annotated[int, Field(ge=0, le=1_000_000)]
 
 
 class FrameAnswer(Strict):
@@ -31,12 +37,12 @@ class FrameAnswer(Strict):
 class ReportBody(Strict):
     """The page's report; see `ScreenReport`."""
 
-    id: str
-    digest: str
-    reason: str
-    width_px: int
-    height_px: int
-    device_pixel_ratio: float
+    id: Text
+    digest: Text
+    reason: Text
+    width_px: Pixels
+    height_px: Pixels
+    device_pixel_ratio: Annotated[float, Field(ge=0, le=1000)]
 
 
 def create_kiosk_router(screen: KioskScreen) -> APIRouter:

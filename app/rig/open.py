@@ -31,6 +31,8 @@ from drivers.simulated import SensorNoise, SimulatedCamera, SimulatedDisplay
 from drivers.simulated.projector.open import TWINS, open_twin
 from drivers.v4l2 import list_devices
 
+# A lamp that warms up for longer than an hour is a slip.
+LONGEST_S = 3600.0
 AirState = Literal["still", "moving"]
 
 # The print around a simulated room: as fine as the pattern, but another one.
@@ -80,6 +82,8 @@ def _twin(url: str) -> Projector:
         parts = urlsplit(url)
         asked = parse_qs(parts.query)
         warm_up_s, cool_down_s = (float(asked[name][-1]) for name in ("warm_up_s", "cool_down_s"))
+        if not (0 <= warm_up_s <= LONGEST_S and 0 <= cool_down_s <= LONGEST_S):
+            raise ValueError(f"expected times of 0 to {LONGEST_S:g} s")
         return open_twin(parts.path or "escvp21", SystemClock(), warm_up_s, cool_down_s)
     except (KeyError, ValueError) as error:
         raise BadInputError(

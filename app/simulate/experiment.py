@@ -9,7 +9,7 @@ from app.capture.burst import Watch, take
 from app.errors import AirlensError, BadInputError
 from app.experiment.folder import ExperimentSettings, create_experiment
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
-from app.files.durable import write_durably, write_text
+from app.files.durable import durable_folder, write_durably, write_text
 from app.rig.open import air_of, open_camera
 from app.volume.file import RoomVolume, read_volume
 from app.volume.scene import Information, RigOptions, room_scene, write_plane
@@ -39,15 +39,8 @@ def simulate(
         raise BadInputError(f"{folder} is not empty; give a new folder for the experiment.")
     volume = read_volume(truth_path)
     scene = room_scene(volume, options, information)
-    unfinished = folder.with_name(f".{folder.name}.unfinished")
-    shutil.rmtree(unfinished, ignore_errors=True)
-    try:
+    with durable_folder(folder) as unfinished:
         _fill(unfinished, truth_path, volume, scene, information, camera, on_stage)
-        if folder.exists():
-            folder.rmdir()
-        unfinished.rename(folder)
-    finally:
-        shutil.rmtree(unfinished, ignore_errors=True)
     return folder
 
 

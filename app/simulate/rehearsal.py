@@ -6,13 +6,20 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
-from app.experiment.folder import Experiment, ExperimentSettings, create_experiment, new_id
+from app.calibrate.folder import CalibrationFolder
+from app.experiment.folder import (
+    Experiment,
+    ExperimentSettings,
+    create_experiment,
+    new_folder,
+    open_experiment,
+)
 from app.experiment.rig_settings import BoardSettings, ProjectorSettings, RigSettings, SimulatedCameraSettings
-from app.files.durable import write_durably, write_text
+from app.files.durable import write_durably
 from app.simulate.experiment import TRUTH_FILE
 from app.volume.file import read_volume
 from app.volume.scene import Information, RigOptions, room_scene, write_plane
-from calibration.bundle import given_bundle, to_json
+from calibration.bundle import given_bundle
 from core.scene import PlaneField, ProjectedPattern
 
 # Fast enough to practise with; a real lamp takes longer, and its lamp guard is the real one.
@@ -48,17 +55,14 @@ def rehearse(root: Path, wanted: Rehearsal) -> Experiment:
         ),
         scene=scene,
     )
-    name = new_id(root, "simulated")
-    unfinished = root / f".{name}.unfinished"
-    try:
+
+    def fill(unfinished: Path) -> None:
         create_experiment(unfinished, settings)
         write_durably(unfinished / TRUTH_FILE, lambda temporary: shutil.copyfile(SAMPLE_ROOM, temporary))
         if any(isinstance(known, PlaneField) for known in scene.boundary):
             write_plane(unfinished, volume)
-        unfinished.rename(root / name)
-    finally:
-        shutil.rmtree(unfinished, ignore_errors=True)
-    return Experiment(root / name, settings)
+
+    return open_experiment(new_folder(root, "simulated", fill))
 
 
 def calibrate_simulated(experiment: Experiment) -> None:
@@ -72,4 +76,4 @@ def calibrate_simulated(experiment: Experiment) -> None:
         noise={view.name: view.noise for view in scene.views},
         back_wall_y_m=scene.room.upper_m[1],
     )
-    write_text(experiment.bundle_path, to_json(bundle))
+    CalibrationFolder(experiment.folder).change_bundle(lambda _old: bundle)

@@ -5,7 +5,6 @@ u in m/s with the last axis x, y, z. `meta_json` may describe the case: domain, 
 """
 
 import json
-import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,9 @@ import numpy as np
 from jaxtyping import Float
 
 from app.errors import BadInputError
+from app.files.npz import read_npz
+from app.files.reading import reading
 
-_LARGEST_BYTES = 2 << 30
 _REQUIRED = ("x", "y", "z", "T", "p", "u", "T0")
 
 
@@ -49,7 +49,14 @@ class Beside:
 
 def read_volume(path: Path) -> RoomVolume:
     """Read and check a volume. Raises BadInputError for anything that is not one."""
-    arrays = _read_npz(path)
+    if not path.is_file():
+        raise BadInputError(f"There is no volume {path}. Give an NPZ file with T, p and u of a room.")
+    what_to_do = "It may be truncated; export the volume again."
+    with reading(path, what_to_do):
+        return _volume(path, read_npz(path, what_to_do))
+
+
+def _volume(path: Path, arrays: dict[str, np.ndarray]) -> RoomVolume:
     missing = [name for name in _REQUIRED if name not in arrays]
     if missing:
         raise BadInputError(
@@ -71,7 +78,7 @@ def read_volume(path: Path) -> RoomVolume:
             )
     _check_temperature(path, "T", arrays["T"])
     _check_temperature(path, "T0", arrays["T0"])
-    case = _case(path, arrays)
+    case = _case(arrays)
     scalars = {k: v.item() for k, v in arrays.items() if v.ndim == 0 and v.dtype.kind in "fiu"}
     return RoomVolume(
         x_m=x,
@@ -88,25 +95,6 @@ def read_volume(path: Path) -> RoomVolume:
     )
 
 
-def _read_npz(path: Path) -> dict[str, np.ndarray]:
-    if not path.is_file():
-        raise BadInputError(f"There is no volume {path}. Give an NPZ file with T, p and u of a room.")
-    try:
-        with zipfile.ZipFile(path) as archive:
-            unpacked = sum(info.file_size for info in archive.infolist())
-        if unpacked > _LARGEST_BYTES:
-            raise BadInputError(
-                f"{path} unpacks to {unpacked / 1e9:.1f} GB; expected at most {_LARGEST_BYTES / 1e9:.1f} GB. "
-                "Resample it on a coarser grid."
-            )
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile, zipfile.LargeZipFile) as error:
-        raise BadInputError(
-            f"{path} is not a readable NPZ ({error}); it may be truncated. Copy it again."
-        ) from None
-
-
 def _check_temperature(path: Path, name: str, temperature_k: np.ndarray) -> None:
     lowest, highest = float(temperature_k.min()), float(temperature_k.max())
     if not (lowest >= 150 and highest <= 5000):
@@ -116,10 +104,7 @@ def _check_temperature(path: Path, name: str, temperature_k: np.ndarray) -> None
         )
 
 
-def _case(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+def _case(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     if "meta_json" not in arrays:
         return {}
-    try:
-        return dict(json.loads(str(arrays["meta_json"])).get("case", {}))
-    except (json.JSONDecodeError, AttributeError, TypeError) as error:
-        raise BadInputError(f"{path}: meta_json is not JSON ({error}); export the volume again.") from None
+    return dict(json.loads(str(arrays["meta_json"])).get("case", {}))

@@ -16,6 +16,8 @@ from drivers.projector.pjlink_port import PjLinkPort
 from drivers.projector.port import Port, SerialPort, TcpPort
 
 DIALECTS: dict[str, type] = {kind.name: kind for kind in (EscVp21, PjLink, BenQ, Optoma, Nec)}
+# What serial adapters offer.
+LOWEST_BAUD, HIGHEST_BAUD = 50, 4_000_000
 _TCP_PORTS = {"pjlink": 4352, "nec": 7142, "optoma": 23, "benq": 8000, "escvp21": 3629}
 
 
@@ -24,7 +26,13 @@ def open_projector(url: str, *, password: str = "", journal: Path | None = None)
 
     Raises DeviceSettingError for text that names no dialect or no line.
     """
-    parts = urlsplit(url)
+    try:
+        parts = urlsplit(url)
+        (parts.hostname or "").encode("idna")
+    except ValueError as error:
+        raise DeviceSettingError(
+            f"{url!r} is no address ({error}). Write it as pjlink://192.168.1.5."
+        ) from None
     if parts.scheme not in DIALECTS or not (parts.path or parts.hostname):
         raise DeviceSettingError(
             f"{url!r} names no projector; expected DIALECT:/dev/ttyUSB0 or DIALECT://address, "
@@ -39,6 +47,8 @@ def _port(url: str, password: str) -> Port:
     try:
         baud = int(parse_qs(parts.query).get("baud", ["9600"])[0])
         number = parts.port or _TCP_PORTS[parts.scheme]
+        if not LOWEST_BAUD <= baud <= HIGHEST_BAUD:
+            raise ValueError(f"baud is {baud}, expected {LOWEST_BAUD} to {HIGHEST_BAUD}")
     except ValueError as error:
         raise DeviceSettingError(f"{url!r}: {error}. Give whole numbers for baud and port.") from None
     if not parts.hostname:

@@ -153,8 +153,8 @@ ROWS = [
     volume("one layer", Refused("increase|shape"), x=np.zeros(1)),
     volume("upside down", Refused("increase"), z=np.linspace(1, 0, 3)),
     volume("no pressure", Refused("has no p"), p=None),
-    file("a volume that is no NPZ", "not a readable NPZ", read_volume, b"PK\x03\x04cut short"),
-    file("an image that is no TIFF", "not a capture's image", read_image, b"II*\x00"),
+    file("a volume that is no NPZ", "cannot be read", read_volume, b"PK\x03\x04cut short"),
+    file("an image that is no TIFF", "A capture's image", read_image, b"II*\x00"),
 ]  # fmt: skip
 
 

@@ -75,10 +75,13 @@ class SettingResource(Strict):
 
 
 class CaptureResource(Strict):
-    """One capture. `interrupted` ones have no manifest and are never used as a measurement."""
+    """One capture. `interrupted` ones have no manifest and are never used as a measurement.
+
+    `reason` says why a `broken` one cannot be read. `revision` goes into the `If-Match` of a change of its notes.
+    """
 
     capture: str
-    state: Literal["finished", "incomplete", "interrupted"]
+    state: Literal["finished", "incomplete", "interrupted", "broken"]
     role: str | None
     created: str | None
     frames: int | None
@@ -87,6 +90,8 @@ class CaptureResource(Strict):
     verdicts: list[VerdictResource]
     settings: list[SettingResource]
     notes: str
+    revision: str
+    reason: str = ""
 
 
 class CaptureChange(Strict):

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from app.api.models.strict import Strict
+from app.api.models.strict import Named, Strict
 
 
 class CameraResource(Strict):
@@ -26,7 +26,7 @@ class CameraResource(Strict):
 class OpenCamera(Strict):
     """Which rig to connect; `air` is what a simulated room does."""
 
-    experiment: str
+    experiment: Named
     air: Literal["still", "moving"] = "still"
 
 

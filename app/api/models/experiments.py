@@ -9,7 +9,11 @@ from app.api.models.strict import Strict
 
 
 class ExperimentLine(Strict):
-    """One line of the list of experiments; `uncalibrated` names the parts of the rig that need it still."""
+    """One line of the list of experiments; `uncalibrated` names the parts of the rig that need it still.
+
+    `reason` says what is wrong with an experiment that cannot be read: then only its name and date are known.
+    `revision` goes into the `If-Match` of a change.
+    """
 
     experiment: str
     title: str
@@ -23,6 +27,8 @@ class ExperimentLine(Strict):
     captures: int
     results: int
     changed: str
+    revision: str
+    reason: str = ""
 
 
 class ExperimentResource(ExperimentLine):

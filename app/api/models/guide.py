@@ -1,6 +1,6 @@
 """The guided calibration: what is wanted, what was found, what is asked for."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -8,6 +8,10 @@ from app.api.models.board import BoardGeometry
 from app.api.models.strict import Strict
 
 StepText = Literal["camera", "projector", "wall", "response"]
+
+
+# A pixel of any picture, a metre of any room.
+Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class WantedResource(Strict):
@@ -72,7 +76,7 @@ class GuideRequest(Strict):
     frames: int = Field(default=1, ge=1, le=1000)
     response_frames: int = Field(default=16, ge=2, le=1000)
     settle_s: float = Field(default=0.2, ge=0, le=60)
-    anchor: tuple[float, float, float, float] | None = None
-    plumb_px: tuple[float, float, float, float] | None = None
+    anchor: tuple[Place, Place, Place, Place] | None = None
+    plumb_px: tuple[Place, Place, Place, Place] | None = None
     ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
     minutes_on: float | None = Field(default=None, ge=0, le=1e6)

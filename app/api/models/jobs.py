@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from app.api.models.strict import Strict
+from app.api.models.strict import Named, Strict
 
 State = Literal["queued", "running", "pausing", "cancelling", "paused", "lost", "done", "failed", "cancelled"]
 
@@ -38,18 +38,18 @@ class NewJob(Strict):
 
     kind: str = Field(min_length=1, max_length=64)
     settings: dict[str, Any] = Field(default_factory=dict)
-    experiment: str | None = None
+    experiment: Named | None = None
     title: str = Field(default="", max_length=200)
     priority: int = Field(default=0, ge=-1000, le=1000)
     key: str | None = Field(default=None, min_length=8, max_length=100)
-    group: str | None = None
+    group: Named | None = None
 
 
 class JobChange(Strict):
     """A new priority, or a new place: before another waiting job, or last."""
 
     priority: int | None = Field(default=None, ge=-1000, le=1000)
-    before: str | None = None
+    before: Named | None = None
 
 
 class Curves(Strict):

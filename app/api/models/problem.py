@@ -1,5 +1,7 @@
 """What every refusal and failure looks like: RFC 9457 problem details."""
 
+from typing import Any
+
 from pydantic import BaseModel, ConfigDict
 
 MEDIA_TYPE = "application/problem+json"
@@ -14,7 +16,10 @@ class FieldError(BaseModel):
 
 
 class Problem(BaseModel):
-    """RFC 9457 problem details. `detail` is written for the operator and is shown as it is."""
+    """RFC 9457 problem details. `detail` is written for the operator and is shown as it is.
+
+    `current` and `sent` are both versions of what somebody else changed meanwhile (code `changed`).
+    """
 
     model_config = ConfigDict(extra="forbid")
     type: str
@@ -26,3 +31,5 @@ class Problem(BaseModel):
     next_step: str
     instance: str | None = None
     errors: list[FieldError] = []
+    current: dict[str, Any] | None = None
+    sent: dict[str, Any] | None = None

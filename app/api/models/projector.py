@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from app.api.models.strict import Strict
+from app.api.models.strict import Named, Strict
 
 
 class ProjectorResource(Strict):
@@ -28,7 +28,7 @@ class ProjectorResource(Strict):
 class OpenProjector(Strict):
     """Which rig's projector to speak to."""
 
-    experiment: str
+    experiment: Named
 
 
 class ProjectorChange(Strict):

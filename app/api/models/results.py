@@ -16,13 +16,17 @@ class PresetResource(Strict):
 
 
 class ResultLine(Strict):
-    """One line of the list of results. `interrupted` ones have no manifest and are never used."""
+    """One line of the list of results. `interrupted` ones have no manifest and are never used.
+
+    `reason` says why a `broken` one cannot be read.
+    """
 
     result: str
     state: str
     created: str | None
     preset: str | None
     outcome: str | None
+    reason: str = ""
 
 
 class FieldResource(Strict):

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from app.api.models.strict import Strict
+from app.api.models.strict import Named, Strict
 
 PatternName = Literal["scene", "identify", "focus", "white", "grey", "black"]
 State = Literal["empty", "waiting", "showing", "refused", "away"]
@@ -23,5 +23,5 @@ class ScreenResource(Strict):
 class ShowPattern(Strict):
     """Which pattern of which experiment's projector."""
 
-    experiment: str
+    experiment: Named
     pattern: PatternName

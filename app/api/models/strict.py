@@ -1,8 +1,11 @@
 """The base of everything that crosses the API: strict, closed, unchangeable."""
 
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
+
+# An id that the service gave, where a request names a thing.
+Named = Annotated[str, Field(max_length=100)]
 
 
 class Strict(BaseModel):

@@ -2,6 +2,8 @@
 
 from typing import Literal
 
+from pydantic import Field
+
 from app.api.models.strict import Strict
 
 
@@ -18,11 +20,12 @@ class UploadedArray(Strict):
 
 
 class Upload(Strict):
-    """A file that was checked, read and kept."""
+    """A file that was checked, read and kept; `reason` says why a `broken` one cannot be read any more."""
 
     upload: str
-    kind: Literal["png", "tiff", "npy", "npz"]
-    bytes: int
-    sha256: str
-    received_s: float
-    arrays: list[UploadedArray]
+    kind: Literal["png", "tiff", "npy", "npz", "broken"]
+    bytes: int = 0
+    sha256: str = ""
+    received_s: float = 0.0
+    arrays: list[UploadedArray] = Field(default_factory=list)
+    reason: str = ""

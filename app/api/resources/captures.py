@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from fastapi import APIRouter, Query, Response
 
-from app.api.folders import child
+from app.api.folders import child, shown_name
 from app.api.models.captures import (
     Abort,
     CaptureChange,
@@ -22,13 +22,16 @@ from app.api.services import Given, Services
 from app.api.wire.bodies import body
 from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
+from app.api.wire.revision import IfMatch, check_revision, etag
 from app.api.wire.volumes import Encoding, pack
 from app.capture.burst import Order
 from app.capture.service import DeskState
+from app.errors import BadInputError
 from app.experiment.capture_files import BurstImage
 from app.experiment.captures import load_capture
-from app.experiment.folder import read_manifest
+from app.experiment.folder import read_manifest, revision_of
 from app.files.durable import write_text
+from app.files.reading import reading
 from app.rig.conditions import conditions_in
 from drivers.burst import CapturePlan
 
@@ -53,7 +56,8 @@ def abort_capture(given: Given, wanted: Abort) -> DeskResource:
 @router.post("/experiments/{experiment}/captures", status_code=202)
 def start_capture(given: Given, experiment: Identifier, new: NewCapture) -> DeskResource:
     """Begin a capture; it goes on when the browser is closed."""
-    return DeskResource.of(given.desk.start(given.folders.open(experiment), order_of(new)))
+    found = given.confirmed.check(given.folders.open(experiment))
+    return DeskResource.of(given.desk.start(found, order_of(new)))
 
 
 def order_of(new: NewCapture) -> Order:
@@ -70,23 +74,38 @@ def list_captures(given: Given, experiment: Identifier) -> list[CaptureResource]
     desk = given.desk.status
     if desk.state is DeskState.running and desk.experiment == experiment:
         broken = [folder for folder in broken if folder.name != desk.capture]
-    return [_resource(folder) for folder in done] + [_interrupted(folder) for folder in broken]
+    return [_line(folder) for folder in done] + [_bare(folder, "interrupted") for folder in broken]
 
 
 @router.get("/experiments/{experiment}/captures/{capture}")
-def read_capture(given: Given, experiment: Identifier, capture: Identifier) -> CaptureResource:
+def read_capture(
+    given: Given, experiment: Identifier, capture: Identifier, response: Response
+) -> CaptureResource:
     """Return one capture."""
-    return _resource(given.folders.item(experiment, "capture", capture))
+    found = _resource(given.folders.item(experiment, "capture", capture))
+    response.headers.update(etag(found.revision))
+    return found
 
 
 @router.patch("/experiments/{experiment}/captures/{capture}")
 def change_capture(
-    given: Given, experiment: Identifier, capture: Identifier, change: CaptureChange
+    given: Given,
+    experiment: Identifier,
+    capture: Identifier,
+    change: CaptureChange,
+    response: Response,
+    if_match: IfMatch = None,
 ) -> CaptureResource:
     """Write notes beside a capture."""
-    folder = given.folders.item(experiment, "capture", capture)
-    write_text(folder / NOTES, change.notes)
-    return _resource(folder)
+    with given.folders.locked(experiment):
+        folder = given.folders.item(experiment, "capture", capture)
+        before = _resource(folder)
+        current = {"revision": before.revision, "notes": before.notes}
+        check_revision(if_match, current, change.model_dump())
+        write_text(folder / NOTES, change.notes)
+        found = _resource(folder)
+    response.headers.update(etag(found.revision))
+    return found
 
 
 @router.delete("/experiments/{experiment}/captures/{capture}", status_code=204)
@@ -139,8 +158,20 @@ def _png(image: np.ndarray, width: int) -> bytes:
     return encoded.tobytes() if done else b""
 
 
+def _line(folder: Path) -> CaptureResource:
+    try:
+        return _resource(folder)
+    except BadInputError as error:
+        return _bare(folder, "broken", str(error))
+
+
 def _resource(folder: Path) -> CaptureResource:
     manifest = read_manifest(folder)
+    with reading(folder / "manifest.json", "Discard the capture, or restore it from a copy."):
+        return _shown(folder, manifest)
+
+
+def _shown(folder: Path, manifest: dict[str, Any]) -> CaptureResource:
     view = manifest["views"][0]
     camera = view.get("camera", {})
     return CaptureResource(
@@ -154,6 +185,7 @@ def _resource(folder: Path) -> CaptureResource:
         verdicts=[VerdictResource(**_float(one, "value")) for one in view.get("verdicts", [])],
         settings=[SettingResource(**_float(one, "granted")) for one in view.get("settings", [])],
         notes=_notes(folder),
+        revision=revision_of(_notes(folder).encode()),
     )
 
 
@@ -162,10 +194,10 @@ def _float(content: dict[str, Any], name: str) -> dict[str, Any]:
     return content if content[name] is None else {**content, name: float(content[name])}
 
 
-def _interrupted(folder: Path) -> CaptureResource:
+def _bare(folder: Path, state: Literal["interrupted", "broken"], reason: str = "") -> CaptureResource:
     return CaptureResource(
-        capture=folder.name,
-        state="interrupted",
+        capture=shown_name(folder),
+        state=state,
         role=None,
         created=None,
         frames=None,
@@ -174,9 +206,11 @@ def _interrupted(folder: Path) -> CaptureResource:
         verdicts=[],
         settings=[],
         notes=_notes(folder),
+        revision=revision_of(_notes(folder).encode()),
+        reason=reason,
     )
 
 
 def _notes(folder: Path) -> str:
     path = folder / NOTES
-    return path.read_text(encoding="utf-8") if path.is_file() else ""
+    return path.read_bytes().decode("utf-8", "replace") if path.is_file() else ""

@@ -41,7 +41,7 @@ async def read_camera(given: Given) -> CameraResource:
 @router.post("/devices/camera/connect")
 def connect_camera(given: Given, wanted: OpenCamera) -> CameraResource:
     """Connect, or reconnect, the camera of an experiment's rig."""
-    experiment = given.folders.open(wanted.experiment)
+    experiment = given.confirmed.check(given.folders.open(wanted.experiment))
     status = given.camera.open(wanted.experiment, lambda: open_camera(experiment, wanted.air), wanted.air)
     return CameraResource.of(status)
 

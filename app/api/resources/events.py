@@ -25,7 +25,7 @@ Row = Annotated[int | None, Query(ge=0, le=1 << 62)]
 def list_events(
     given: Given,
     after: Row = None,
-    job: str | None = None,
+    job: Annotated[str | None, Query(max_length=100)] = None,
     limit: Annotated[int, Query(ge=1, le=5000)] = 500,
 ) -> list[EventResource]:
     """List what happened after event `after`, oldest first."""

@@ -1,16 +1,24 @@
 """Experiments: one folder each; the rig, the scene, and counts of what was taken and computed."""
 
+import contextlib
 from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 
+from app.api.folders import shown_name
 from app.api.models.experiments import ExperimentChange, ExperimentLine, ExperimentResource, NewExperiment
-from app.api.services import Given
+from app.api.services import Given, Services
 from app.api.wire.board import board_settings
 from app.api.wire.identifier import Identifier
+from app.api.wire.problems import ApiError
+from app.api.wire.revision import IfMatch, check_revision, etag
 from app.calibrate.parts import is_calibrated, parts_of
-from app.experiment.folder import Experiment, finished, save_settings
+from app.errors import BadInputError
+from app.experiment.folder import SETTINGS_FILE, Experiment, finished, save_settings
 from app.experiment.plan import PLAN_FILE
+from app.files.reading import reading
 from app.files.toml import to_plain
 from app.simulate.rehearsal import Rehearsal, rehearse
 from core.scene import ProjectedPattern
@@ -21,36 +29,83 @@ router = APIRouter(tags=["experiments"])
 @router.get("/experiments")
 def list_experiments(given: Given) -> list[ExperimentLine]:
     """List the experiments, newest first."""
-    return [_line(given.folders.open(folder.name)) for folder in given.folders.all()]
+    return [_line_or_reason(given, folder) for folder in given.folders.all()]
 
 
 @router.post("/experiments", status_code=201)
-def create_experiment(given: Given, new: NewExperiment) -> ExperimentResource:
+def create_experiment(given: Given, new: NewExperiment, response: Response) -> ExperimentResource:
     """Make an experiment with a simulated rig, ready to be connected."""
     made = rehearse(given.folders.root, Rehearsal(new.title, new.camera_px, new.light, new.boundary))
     given.ledger.append_event("experiment", {"experiment": made.folder.name, "created": True})
-    return _resource(made)
+    return _resource(made, response)
 
 
 @router.get("/experiments/{experiment}")
-def read_experiment(given: Given, experiment: Identifier) -> ExperimentResource:
+def read_experiment(given: Given, experiment: Identifier, response: Response) -> ExperimentResource:
     """Return one experiment."""
-    return _resource(given.folders.open(experiment))
+    return _resource(given.folders.open(experiment), response)
 
 
 @router.patch("/experiments/{experiment}")
-def change_experiment(given: Given, experiment: Identifier, change: ExperimentChange) -> ExperimentResource:
-    """Change title, notes, or the board to calibrate with."""
-    found = given.folders.open(experiment)
+def change_experiment(
+    given: Given,
+    experiment: Identifier,
+    change: ExperimentChange,
+    response: Response,
+    if_match: IfMatch = None,
+) -> ExperimentResource:
+    """Change title, notes, or the board to calibrate with; what is left out stays as somebody else left it."""
     words = change.model_dump(exclude_none=True, exclude={"board"})
-    if change.board is not None:
-        words["rig"] = found.settings.rig.model_copy(update={"board": board_settings(change.board)})
-    return _resource(save_settings(found.folder, found.settings.model_copy(update=words)))
+    board = None if change.board is None else board_settings(change.board)
+    with given.folders.locked(experiment):
+        found = given.folders.open(experiment)
+        check_revision(if_match, _changeable(found), change.model_dump(exclude_none=True))
+        if board is not None:
+            words["rig"] = found.settings.rig.model_copy(update={"board": board})
+        saved = save_settings(found.folder, found.settings.model_copy(update=words))
+    return _resource(saved, response)
+
+
+def _changeable(experiment: Experiment) -> dict[str, Any]:
+    """What a change may change, as it stands."""
+    settings = experiment.settings
+    board = None if settings.rig.board is None else settings.rig.board.model_dump()
+    words = {"title": settings.title, "information": settings.information}
+    return {"revision": experiment.revision, **words, "board": board}
+
+
+def _line_or_reason(given: Services, folder: Path) -> ExperimentLine:
+    try:
+        with reading(folder, "Correct or remove it."):
+            return _line(given.folders.open(folder.name))
+    except (BadInputError, ApiError) as error:
+        return ExperimentLine(
+            experiment=shown_name(folder),
+            title=shown_name(folder),
+            information="",
+            camera="",
+            projector=False,
+            light="texture",
+            calibrated=False,
+            uncalibrated=[],
+            planned=False,
+            captures=0,
+            results=0,
+            changed=_changed(folder),
+            revision="",
+            reason=str(error) or "It cannot be read.",
+        )
+
+
+def _changed(folder: Path) -> str:
+    with contextlib.suppress(OSError, ValueError, OverflowError):
+        changed_s = (folder / SETTINGS_FILE).stat().st_mtime
+        return datetime.fromtimestamp(changed_s, UTC).isoformat(timespec="seconds")
+    return ""
 
 
 def _line(experiment: Experiment) -> ExperimentLine:
     settings, parts = experiment.settings, parts_of(experiment)
-    changed_s = (experiment.folder / "experiment.toml").stat().st_mtime
     return ExperimentLine(
         experiment=experiment.folder.name,
         title=settings.title,
@@ -63,9 +118,11 @@ def _line(experiment: Experiment) -> ExperimentLine:
         planned=(experiment.folder / PLAN_FILE).is_file(),
         captures=len(finished(experiment.captures_folder)),
         results=len(finished(experiment.results_folder)),
-        changed=datetime.fromtimestamp(changed_s, UTC).isoformat(timespec="seconds"),
+        changed=_changed(experiment.folder),
+        revision=experiment.revision,
     )
 
 
-def _resource(experiment: Experiment) -> ExperimentResource:
+def _resource(experiment: Experiment, response: Response) -> ExperimentResource:
+    response.headers.update(etag(experiment.revision))
     return ExperimentResource(**_line(experiment).model_dump(), settings=to_plain(experiment.settings))

@@ -33,7 +33,7 @@ def read_guide(given: Given, experiment: Identifier, step: StepQuery = "camera")
 @router.post("/experiments/{experiment}/calibration/guide", status_code=202)
 def take_guided(given: Given, experiment: Identifier, request: GuideRequest) -> GuideResource:
     """Take the pictures of what is wanted next; follow it by the `calibration` events, or by asking."""
-    found = given.folders.open(experiment)
+    found = given.confirmed.check(given.folders.open(experiment))
     plan = _plan(found, request)
     given.guide.take(found, plan, Conditions(request.ambient_temperature_k, request.minutes_on))
     return _resource(given, found, plan)

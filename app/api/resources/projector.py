@@ -25,7 +25,7 @@ def read_projector(given: Given) -> ProjectorResource:
 @router.post("/devices/projector/connect")
 def connect_projector(given: Given, wanted: OpenProjector) -> ProjectorResource:
     """Speak to the projector of an experiment's rig; connecting again opens the line anew."""
-    experiment = given.folders.open(wanted.experiment)
+    experiment = given.confirmed.check(given.folders.open(wanted.experiment))
     return projector_resource(given.projector.open(wanted.experiment, lambda: open_projector(experiment)))
 
 

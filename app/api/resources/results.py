@@ -1,13 +1,14 @@
 """Results: what came out, as numbers for the page and as files for other programs."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
+from pydantic_core import from_json
 
+from app.api.folders import shown_name
 from app.api.models.results import (
     ComparisonResource,
     FieldResource,
@@ -24,7 +25,9 @@ from app.api.wire.bodies import body
 from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
 from app.api.wire.volumes import Axis, Encoding, Packed, Shown, Volume, cut, pack
+from app.errors import BadInputError
 from app.experiment.folder import read_manifest
+from app.files.reading import reading
 
 router = APIRouter(tags=["results"])
 NUMBERS = body(
@@ -41,7 +44,7 @@ def list_results(given: Given, experiment: Identifier) -> list[ResultLine]:
     done, broken = given.folders.items(experiment, "result")
     lines = [_line(path) for path in done]
     unfinished = [
-        ResultLine(result=path.name, state="interrupted", created=None, preset=None, outcome=None)
+        ResultLine(result=shown_name(path), state="interrupted", created=None, preset=None, outcome=None)
         for path in broken
     ]
     return lines + unfinished
@@ -100,9 +103,8 @@ def read_history(given: Given, experiment: Identifier, result: Identifier) -> li
     path = given.folders.item(experiment, "result", result) / "history.jsonl"
     if not path.is_file():
         return []
-    return [
-        _finite(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()
-    ]
+    with reading(path, "Reconstruct again."):
+        return [_finite(from_json(line)) for line in path.read_bytes().splitlines() if line.strip()]
 
 
 @router.get("/experiments/{experiment}/results/{result}/comparison")
@@ -197,28 +199,38 @@ def _volume(shown: Shown, field: str) -> Volume:
 
 
 def _line(folder: Path) -> ResultLine:
-    manifest = read_manifest(folder)
-    texts = {key: manifest.get(key) for key in ("created", "preset", "outcome")}
+    try:
+        manifest = read_manifest(folder)
+    except BadInputError as error:
+        return ResultLine(
+            result=shown_name(folder),
+            state="broken",
+            created=None,
+            preset=None,
+            outcome=None,
+            reason=str(error),
+        )
+    created, preset, outcome = (
+        None if manifest.get(key) is None else str(manifest[key]) for key in ("created", "preset", "outcome")
+    )
     return ResultLine(
-        result=folder.name,
-        state="finished",
-        **{key: None if value is None else str(value) for key, value in texts.items()},
+        result=shown_name(folder), state="finished", created=created, preset=preset, outcome=outcome
     )
 
 
 def _field(volume: Volume) -> FieldResource:
     values = volume.values
-    low, high = np.percentile(values, (1, 99))
+    low, high = np.nanpercentile(values, (1, 99))
     return FieldResource(
         name=volume.name,
         unit=volume.unit,
         label=volume.label,
         kind=volume.kind,
-        minimum=float(values.min()),
-        maximum=float(values.max()),
+        minimum=float(np.nanmin(values)),
+        maximum=float(np.nanmax(values)),
         low=float(low),
         high=float(high),
-        mean=float(values.mean(dtype="float64")),
+        mean=float(np.nanmean(values, dtype="float64")),
     )
 
 

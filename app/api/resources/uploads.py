@@ -1,6 +1,9 @@
 """Files that an operator sends: PNG, TIFF, NPY and NPZ, as the raw body of one request."""
 
+from typing import Any
+
 from fastapi import APIRouter, Request
+from pydantic import ValidationError
 
 from app.api.models.uploads import Upload
 from app.api.services import Given
@@ -16,7 +19,20 @@ BODY = {"requestBody": {"required": True, "content": {"application/octet-stream"
 @router.get("/uploads")
 def list_uploads(given: Given) -> list[Upload]:
     """List the uploads, newest first."""
-    return [Upload.model_validate(manifest) for manifest in given.uploads.list()]
+    return [_line(manifest) for manifest in given.uploads.list()]
+
+
+def _line(manifest: dict[str, Any]) -> Upload:
+    name = str(manifest.get("upload", ""))
+    if "reason" in manifest:
+        return Upload(upload=name, kind="broken", reason=str(manifest["reason"]))
+    try:
+        return Upload.model_validate(manifest)
+    except ValidationError:
+        reason = (
+            f"The manifest of {name} has other fields than an upload's. Delete it and send the file again."
+        )
+        return Upload(upload=name, kind="broken", reason=reason)
 
 
 @router.post("/uploads", status_code=201, openapi_extra=BODY)

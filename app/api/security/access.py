@@ -4,11 +4,10 @@ Each rule answers a known attack: Host against DNS rebinding, Origin and Sec-Fet
 (also those on other ports of this machine, which SameSite does not see), the token against other users.
 """
 
-import hashlib
 import hmac
-from collections.abc import Iterable
 from dataclasses import dataclass
 
+from app.api.security.sessions import Sessions
 from app.api.security.settings import ServiceConfig
 from app.api.wire.problems import ApiError
 
@@ -38,8 +37,8 @@ class Access:
         self._origins = frozenset(origin.encode() for origin in config.origins)
         self._token = config.token.encode()
         self._cookie_name = config.cookie_name.encode()
-        # Derived from the token, so it survives a restart and dies with the token.
-        self.cookie = hmac.new(self._token, b"airlens cookie", hashlib.sha256).hexdigest()
+        limits, kept = config.limits, config.data_root / "service" / "sessions.json"
+        self.sessions = Sessions(kept, config.token, limits.session_idle_s, limits.session_s)
 
     def refusal(self, caller: Caller) -> ApiError | None:
         """Return why `caller` may not pass, or None."""
@@ -67,7 +66,7 @@ class Access:
         if offered:
             good = len(offered) == 1 and self._bearer_matches(offered[0])
             return None if good else _no_token("The token is not the one of this service.")
-        if not self._has_cookie(caller.values(b"cookie")):
+        if not self._has_session(caller):
             return _no_token("The request carries no valid token or session.")
         if not self._is_safe(caller) and not caller.values(b"origin"):
             return ApiError("origin_refused", "A change by session cookie must say which page it comes from.")
@@ -80,14 +79,21 @@ class Access:
         scheme, token = value[: len(BEARER)], value[len(BEARER) :]
         return scheme.lower() == BEARER and hmac.compare_digest(token, self._token)
 
-    def _has_cookie(self, lines: Iterable[bytes]) -> bool:
+    def still(self, caller: Caller) -> bool:
+        """Whether who passed by a session may go on with an answer that has no end."""
+        return bool(caller.values(b"authorization")) or self._has_session(caller, use=False)
+
+    def _has_session(self, caller: Caller, use: bool = True) -> bool:
         found = [
             value.strip()
-            for line in lines
+            for line in caller.values(b"cookie")
             for name, _, value in (part.partition(b"=") for part in line.split(b";"))
             if name.strip() == self._cookie_name
         ]
-        return len(found) == 1 and hmac.compare_digest(found[0], self.cookie.encode())
+        hosts = caller.values(b"host")
+        if len(found) != 1 or len(hosts) != 1:
+            return False
+        return self.sessions.is_open(found[0].decode("latin-1"), hosts[0].decode("latin-1"), use)
 
 
 def _no_token(cause: str) -> ApiError:

@@ -3,6 +3,8 @@
 Pure ASGI, outermost: no route, static file or error handler can be reached around it.
 """
 
+import asyncio
+
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -17,6 +19,8 @@ from app.api.wire.problems import ApiError, body_of
 PUBLIC_FILES = frozenset({"/", "/index.html", "/favicon.svg"})
 PUBLIC_FOLDER = "/assets/"
 UPLOADS = "/api/uploads"
+# How often a stream looks whether its session is still open.
+LOOK_S = 1.0
 # Answers without an end: each holds a connection, and memory, for as long as somebody looks.
 STREAMS = frozenset({"/api/events", "/api/devices/camera/live", "/api/devices/camera/live.mjpeg"})
 
@@ -46,7 +50,7 @@ class Guard:
         streams = scope["path"] in STREAMS
         self._open_streams += streams
         try:
-            await self._pass(scope, receive, send)
+            await self._pass(scope, self._while_open(scope, receive) if streams else receive, send)
         finally:
             self._open_streams -= streams
 
@@ -56,16 +60,30 @@ class Guard:
         else:
             await self._app(scope, self._bounded(scope, receive), self._finished(scope, send))
 
+    def _while_open(self, scope: Scope, receive: Receive) -> Receive:
+        """A stream ends with the session that opened it: its route hears that the caller is gone."""
+        caller = _caller(scope)
+
+        async def received() -> Message:
+            waiting = asyncio.ensure_future(receive())
+            try:
+                while not (await asyncio.wait({waiting}, timeout=LOOK_S))[0]:
+                    if not self._access.still(caller):
+                        return {"type": f"{scope['type']}.disconnect", "code": 1008}
+                return waiting.result()
+            finally:
+                waiting.cancel()
+
+        return received
+
     def _refusal(self, scope: Scope) -> ApiError | None:
-        websocket = scope["type"] == "websocket"
-        method = "GET" if websocket else scope["method"]
-        caller = Caller(method, is_public(scope["path"], method), tuple(scope["headers"]), websocket)
+        caller = _caller(scope)
         client = client_of(scope)
         refusal = self._access.refusal(caller)
         if refusal is not None:
             wait_s = self._failures.wait_s(client)
             return _too_many(wait_s) if wait_s and refusal.code == "token_missing" else refusal
-        bucket = self._reads if method in SAFE_METHODS else self._writes
+        bucket = self._reads if caller.method in SAFE_METHODS else self._writes
         wait_s = bucket.wait_s(client)
         if wait_s:
             return _too_many(wait_s)
@@ -130,6 +148,12 @@ class Guard:
         _complete(start, scope["path"])
         await send(start)
         await send({"type": f"{kind}.body", "body": body})
+
+
+def _caller(scope: Scope) -> Caller:
+    websocket = scope["type"] == "websocket"
+    method = "GET" if websocket else scope["method"]
+    return Caller(method, is_public(scope["path"], method), tuple(scope["headers"]), websocket)
 
 
 def is_public(path: str, method: str) -> bool:

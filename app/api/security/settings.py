@@ -6,6 +6,7 @@ from pathlib import Path
 
 from app.errors import BadInputError
 
+LONGEST_SESSION_S = 30 * 86400.0
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -24,6 +25,17 @@ class Limits:
     parse_s: float = 30.0
     parse_memory_bytes: int = 4 << 30
     streams: int = 64
+    # NIST SP 800-63B-4 asks at its first level for a new login after 30 days at most, and names no time of
+    # rest. A page watches a night's run unattended: half a day's rest, a week's age.
+    session_idle_s: float = 12 * 3600.0
+    session_s: float = 7 * 86400.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.session_idle_s <= self.session_s <= LONGEST_SESSION_S:
+            raise BadInputError(
+                f"Sessions of {self.session_s:g} s that rest for {self.session_idle_s:g} s; expected a rest "
+                f"above 0, no longer than the session, and that no longer than {LONGEST_SESSION_S:g} s (30 days)."
+            )
 
 
 def built_page() -> Path:
@@ -79,6 +91,7 @@ def service_config(
     (`https://rig.example`): its host and origin are accepted too, and the cookie is then for TLS only.
     """
     scheme = "https" if tls else "http"
+    secure = tls or (public_url or "").startswith("https://")
     names = LOOPBACK if host in LOOPBACK else (host,)
     hosts = {f"[{name}]:{port}" if ":" in name else f"{name}:{port}" for name in names}
     origins = {f"{scheme}://{name}" for name in hosts}
@@ -91,7 +104,8 @@ def service_config(
         token=token,
         hosts=frozenset(hosts),
         origins=frozenset(origins),
-        cookie_name=f"airlens_{port}",
-        secure_cookie=tls or (public_url or "").startswith("https://"),
+        # Cookies know no port, so the name does; __Host- keeps other hosts of the domain from setting it.
+        cookie_name=f"{'__Host-' if secure else ''}airlens_{port}",
+        secure_cookie=secure,
         limits=limits,
     )

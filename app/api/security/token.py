@@ -1,6 +1,5 @@
 """The service's token: random, in a file that only its owner can read, never an argument or a log line."""
 
-import os
 from pathlib import Path
 
 from app.api.security.settings import new_token
@@ -23,6 +22,5 @@ def service_token(data_root: Path, renew: bool = False) -> str:
 
 
 def _write_private(path: Path) -> None:
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with os.fdopen(descriptor, "w", encoding="ascii") as file:
-        file.write(new_token() + "\n")
+    path.chmod(0o600)
+    path.write_text(new_token() + "\n", encoding="ascii")

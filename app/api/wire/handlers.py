@@ -107,10 +107,32 @@ def _device(_request: Request, error: Exception) -> Response:
     return respond(_in_its_words(code, error, "Check cable and power, then reconnect the device."))
 
 
+# What the disk says, in the operator's words: code, cause.
+DISK = {
+    **dict.fromkeys(
+        (errno.ENOSPC, errno.EDQUOT, errno.EFBIG), ("disk_full", "The data disk has no space left.")
+    ),
+    **dict.fromkeys(
+        (errno.EACCES, errno.EPERM, errno.EROFS),
+        ("not_writable", "The data folder cannot be written or read."),
+    ),
+    **dict.fromkeys(
+        (errno.ENOENT, errno.ENOTDIR, errno.ESTALE), ("not_found", "It was removed while it was used.")
+    ),
+    **dict.fromkeys(
+        (errno.EEXIST, errno.ENOTEMPTY, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG),
+        ("conflict", "Something else is in its place in the data folder."),
+    ),
+    **dict.fromkeys(
+        (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN),
+        ("unavailable", "The machine has no files or no memory left for this."),
+    ),
+}
+
+
 def _os(request: Request, error: Exception) -> Response:
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return respond(ApiError("disk_full", "The data disk has no space left."))
-    return _internal(request, error)
+    known = DISK.get(error.errno or 0) if isinstance(error, OSError) else None
+    return _internal(request, error) if known is None else respond(ApiError(*known))
 
 
 def _internal(request: Request, error: Exception) -> Response:

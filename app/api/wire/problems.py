@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from starlette.exceptions import HTTPException
 
@@ -32,6 +33,15 @@ KINDS: Mapping[str, Kind] = {
     "not_found": Kind(404, "Not found", "List the parent resource to see what there is."),
     "method_not_allowed": Kind(405, "This cannot be done here", "Use one of the methods in `Allow`."),
     "conflict": Kind(409, "The state does not allow this", "Read the resource's state and try again."),
+    "changed": Kind(
+        412, "It was changed meanwhile", "Look at both versions, then send the change again or leave it."
+    ),
+    "unconfirmed": Kind(
+        409, "These devices are not confirmed", "Confirm them, if this experiment may open them."
+    ),
+    "not_writable": Kind(
+        409, "The disk does not allow this", "Give the service the right to write there, then try again."
+    ),
     "too_large": Kind(413, "The content is too large", "Send less, or a cropped or binned version."),
     "media_type_refused": Kind(415, "This kind of content is not accepted", "Send one of the kinds named."),
     "invalid": Kind(422, "A value is not valid", "Correct the fields listed under `errors`."),
@@ -61,12 +71,15 @@ class ApiError(HTTPException):
         *,
         errors: list[FieldError] | None = None,
         headers: Mapping[str, str] | None = None,
+        current: dict[str, Any] | None = None,
+        sent: dict[str, Any] | None = None,
     ) -> None:
         super().__init__(KINDS[code].status, cause, dict(headers) if headers else None)
         self.code = code
         self.cause = cause
         self.next_step = next_step
         self.errors = errors or []
+        self.current, self.sent = current, sent
 
 
 def problem_of(error: ApiError, instance: str | None = None) -> Problem:
@@ -85,6 +98,8 @@ def problem_of(error: ApiError, instance: str | None = None) -> Problem:
         next_step=next_step,
         instance=instance,
         errors=error.errors,
+        current=error.current,
+        sent=error.sent,
     )
 
 

@@ -16,6 +16,7 @@ from typing import BinaryIO, Literal
 import numpy as np
 
 from app.errors import BadInputError
+from app.files.reading import reading
 from app.files.uploads.tiff import tiff_pages
 
 Kind = Literal["png", "tiff", "npy", "npz"]
@@ -61,7 +62,7 @@ def check_head(head: bytes, pixels: int) -> Kind:
 
 def declared_arrays(path: Path, kind: Kind, pixels: int, unpacked_bytes: int) -> list[Declared]:
     """Return what the file declares; BadInputError if that is malformed or beyond the limits."""
-    with path.open("rb") as file:
+    with reading("The file", "Write it again."), path.open("rb") as file:
         if kind == "png":
             found = [_png(file.read(HEAD_BYTES), pixels)]
         elif kind == "tiff":
@@ -99,15 +100,15 @@ def _png(head: bytes, pixels: int) -> Declared:
 
 
 def _npy(file: BinaryIO, name: str, size_bytes: int) -> Declared:
-    try:
+    with reading(f"The NPY header of {name!r}", "Save it with numpy.save."):
         version = np.lib.format.read_magic(file)
         readers = {
             (1, 0): np.lib.format.read_array_header_1_0,
             (2, 0): np.lib.format.read_array_header_2_0,
         }
         shape, _, dtype = readers[version](file, max_header_size=HEADER_BYTES)
-    except (ValueError, KeyError, TypeError, SyntaxError, RecursionError, MemoryError, EOFError) as error:
-        raise BadInputError(f"The NPY header of {name!r} cannot be read. Save it with numpy.save.") from error
+        if any(n < 0 for n in shape):
+            raise ValueError(f"its shape is {shape}")
     if dtype.kind not in "biuf" or dtype.itemsize > 8 or len(shape) > 4:
         raise BadInputError(
             f"Array {name!r} has type {dtype} and {len(shape)} axes; expected numbers (bool, integer, float) "

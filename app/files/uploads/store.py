@@ -16,7 +16,8 @@ from typing import Any, BinaryIO
 
 from app.errors import BadInputError
 from app.files.durable import write_json
-from app.files.uploads.declared import HEAD_BYTES, Kind, check_head, declared_arrays
+from app.files.reading import read_json
+from app.files.uploads.declared import HEAD_BYTES, HEADER_BYTES, Kind, check_head, declared_arrays
 
 MANIFEST = "manifest.json"
 
@@ -43,9 +44,12 @@ class UploadStore:
         for left in folder.glob(".*"):
             shutil.rmtree(left, ignore_errors=True)
 
+    def _folders(self) -> list[Path]:
+        return [path.parent for path in self._folder.glob(f"u*/{MANIFEST}")]
+
     async def add(self, chunks: AsyncIterator[bytes]) -> dict[str, Any]:
         """Return the manifest of a new upload; BadInputError, with nothing kept, if it cannot be used."""
-        if len(self.list()) >= self._limits.stored:
+        if len(self._folders()) >= self._limits.stored:
             raise BadInputError(
                 f"There are {self._limits.stored} uploads already. Delete some that are no longer needed."
             )
@@ -60,22 +64,30 @@ class UploadStore:
         return manifest
 
     def list(self) -> list[dict[str, Any]]:
-        """Return the manifests, newest first; what has none is unfinished and not shown."""
-        manifests = [json.loads(path.read_text()) for path in self._folder.glob(f"u*/{MANIFEST}")]
-        return sorted(manifests, key=lambda m: (m["received_s"], m["upload"]), reverse=True)
+        """Return the manifests, newest first; one that cannot be read holds its name and the `reason` only.
+
+        What has no manifest is unfinished and not shown.
+        """
+        found = []
+        for folder in self._folders():
+            try:
+                found.append(read_json(folder / MANIFEST, "Delete the upload and send the file again."))
+            except BadInputError as error:
+                found.append({"upload": folder.name, "reason": str(error)})
+        return sorted(found, key=_newest, reverse=True)
 
     def folder(self, upload: str) -> Path | None:
         """Return the folder of `upload` by listing, so that no path is made from what was asked."""
-        return next(
-            (path.parent for path in self._folder.glob(f"u*/{MANIFEST}") if path.parent.name == upload), None
-        )
+        return next((folder for folder in self._folders() if folder.name == upload), None)
 
     def delete(self, upload: str) -> bool:
         """Remove an upload; False if there is none."""
         folder = self.folder(upload)
         if folder is not None:
-            (folder / MANIFEST).unlink()
-            shutil.rmtree(folder)
+            # Out of sight first: a half-removed one is never shown.
+            hidden = folder.with_name(f".{folder.name}.{secrets.token_hex(8)}")
+            folder.rename(hidden)
+            shutil.rmtree(hidden)
         return folder is not None
 
     async def _read(self, hidden: Path, chunks: AsyncIterator[bytes]) -> dict[str, Any]:
@@ -110,7 +122,8 @@ class UploadStore:
 
 def read_in_child(kind: Kind, source: Path, folder: Path, limits: UploadLimits) -> list[dict[str, Any]]:
     """Return what the child found; BadInputError if it refused, was killed, or took too long."""
-    arguments = [kind, str(source), str(folder), str(limits.parse_memory_bytes), str(int(limits.parse_s) + 1)]
+    bounds = (limits.parse_memory_bytes, int(limits.parse_s) + 1, limits.unpacked_bytes + HEADER_BYTES)
+    arguments = [kind, str(source), str(folder), *map(str, bounds)]
     try:
         # From a thread, not by the event loop: uvloop forks this process, whose other threads may hold locks.
         done = subprocess.run(
@@ -131,6 +144,11 @@ def read_in_child(kind: Kind, source: Path, folder: Path, limits: UploadLimits) 
     refused = json.loads(done.stdout)["reason"] if done.stdout else None
     reason = refused or "it needs more memory or time than is allowed"
     raise BadInputError(f"The file cannot be read: {reason}. Check it in the program that wrote it.")
+
+
+def _newest(manifest: dict[str, Any]) -> tuple[float, str]:
+    received_s = manifest.get("received_s")
+    return (received_s if isinstance(received_s, float) else 0.0, str(manifest.get("upload")))
 
 
 def _write(file: BinaryIO, chunk: bytes) -> None:

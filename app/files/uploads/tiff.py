@@ -10,6 +10,9 @@ from app.errors import BadInputError
 PAGES = 256
 ENTRIES = 64
 WIDTH, LENGTH, BITS, COMPRESSION, SAMPLES, FORMAT = 256, 257, 258, 259, 277, 339
+# A volume in one page: how many images deep, and how large its tiles are.
+DEPTH, TILE_WIDTH, TILE_LENGTH, TILE_DEPTH = 32997, 322, 323, 32998
+READ = (WIDTH, LENGTH, BITS, COMPRESSION, SAMPLES, FORMAT, DEPTH, TILE_WIDTH, TILE_LENGTH, TILE_DEPTH)
 # None, LZW, deflate (two names), PackBits: what tifffile reads without further libraries.
 COMPRESSIONS = (1, 5, 8, 32946, 32773)
 FORMATS = {1: "uint", 2: "int", 3: "float"}
@@ -73,7 +76,7 @@ def _directory(file: BinaryIO, layout: _Layout) -> tuple[dict[int, int], int]:
     raw = file.read(entries * layout.entry.size)
     tags: dict[int, int] = {}
     for tag, kind, count, value in layout.entry.iter_unpack(raw):
-        if tag in (WIDTH, LENGTH, BITS, COMPRESSION, SAMPLES, FORMAT):
+        if tag in READ:
             tags[tag] = _number(file, layout, kind, count, value)
     next_format = layout.order + ("Q" if layout.big else "L")
     return tags, struct.unpack(next_format, file.read(struct.calcsize(next_format)))[0]
@@ -96,6 +99,12 @@ def _number(file: BinaryIO, layout: _Layout, kind: int, count: int, value: bytes
 def _page(tags: dict[int, int], pixels: int) -> Page:
     rows, cols = tags.get(LENGTH, 0), tags.get(WIDTH, 0)
     bits, samples = tags.get(BITS, 1), tags.get(SAMPLES, 1)
+    if tags.get(DEPTH, 1) != 1 or tags.get(TILE_DEPTH, 1) != 1:
+        raise BadInputError(
+            f"A TIFF page is {tags.get(DEPTH, 1)} images deep; expected flat pages. Write one page an image."
+        )
+    if max(tags.get(TILE_WIDTH, 0), 1) * max(tags.get(TILE_LENGTH, 0), 1) > pixels:
+        raise BadInputError("A TIFF page has tiles larger than an image may be. Write it again.")
     if not 0 < rows * cols <= pixels:
         raise BadInputError(
             f"A TIFF page says it has {cols} x {rows} pixels; at most {pixels:,} are accepted. Crop it."

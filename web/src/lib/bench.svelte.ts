@@ -199,6 +199,14 @@ class Bench {
     this.camera = await ask("POST /devices/camera/connect", {}, { experiment: this.here });
   }
 
+  /** The operator's word that the experiment may open the devices that were just shown. */
+  async confirmAddresses(): Promise<void> {
+    const addresses = (this.problem?.current?.["addresses"] ?? []) as string[];
+    await this.attempt("Confirming", () =>
+      ask("PUT /experiments/{experiment}/addresses", { experiment: this.here }, { addresses }),
+    );
+  }
+
   async disconnect(): Promise<void> {
     this.camera = await ask("POST /devices/camera/disconnect", {});
   }

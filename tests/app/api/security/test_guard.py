@@ -162,15 +162,19 @@ def test_the_same_routes_answer_the_holder_of_the_token(guarded: FastAPI):
 
 
 def cookie_of(app: FastAPI) -> bytes:
-    return b"airlens_8765=" + app.state.services.access.cookie.encode()
+    return b"airlens_8765=" + app.state.services.access.sessions.open("127.0.0.1:8765").encode()
 
 
 def test_a_cookie_may_read_but_needs_an_origin_to_change(guarded: FastAPI):
     base = [(b"host", GOOD_HOST), (b"cookie", b"other=1; " + cookie_of(guarded))]
     origin = (b"origin", b"http://127.0.0.1:8765")
     assert ask(guarded, "http", "GET", "/api/health", base)[0] == 200
+    other_host = [(b"host", b"localhost:8765"), *base[1:]]
+    assert ask(guarded, "http", "GET", "/api/health", other_host)[0] == 401
     assert ask(guarded, "http", "DELETE", "/api/session", base)[0] == 403
     assert ask(guarded, "http", "DELETE", "/api/session", [*base, origin])[0] == 200
+    # Logging out ends the session itself, not only this browser's copy of its cookie.
+    assert ask(guarded, "http", "GET", "/api/health", base)[0] == 401
 
 
 def test_a_cookie_dies_with_its_token(guarded: FastAPI, tmp_path):
