@@ -15,7 +15,6 @@ import typer
 import app
 from app.commands import COMMANDS
 from app.commands.lazy import lazy_group
-from app.errors import AirlensError, BadInputError
 from app.files.compilation_cache import use_compilation_cache
 
 PACKAGES = ("calibration", "core", "drivers")
@@ -39,15 +38,15 @@ def main() -> None:
     # No process that is started from here imports from the folder that the operator stands in.
     os.environ["PYTHONSAFEPATH"] = "1"
     use_compilation_cache()
-    try:
-        check_packages()
-    except AirlensError as error:
-        _fail(str(error), 1)
+    in_the_way = stranger()
+    if in_the_way:
+        _fail(in_the_way, 1)
     _run()
 
 
 def _run() -> None:
     # Imported here: only now is it known that these are ours.
+    from app.errors import AirlensError, BadInputError
     from calibration.errors import CalibrationError
     from core.setting import SettingError
     from drivers.errors import DeviceError
@@ -64,17 +63,18 @@ def _run() -> None:
         _fail("Interrupted. What was finished before is kept; nothing half-written is.", 130)
 
 
-def check_packages() -> None:
-    """Raise AirlensError where another program's `core`, `drivers` or `calibration` would be imported."""
+def stranger() -> str:
+    """Where another program's `core`, `drivers` or `calibration` would be imported, what to do; else nothing."""
     home = Path(app.__file__).resolve().parent.parent
     for name in PACKAGES:
         found = find_spec(name)
         place = Path(found.origin).resolve() if found and found.origin else None
         if place is None or place.parent.parent != home:
-            raise AirlensError(
+            return (
                 f"The package {name!r} was found at {place}, not in {home}: another program's is in the way. "
                 "Install airlens into an environment of its own, or take that folder off PYTHONPATH."
             )
+    return ""
 
 
 def _version(wanted: bool) -> None:

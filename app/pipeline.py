@@ -1,13 +1,11 @@
 """The story on one screen: what is known, the captures, the shift, the problem, the air; kept and told."""
 
 import json
+import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from app.capture.checks import aged
 from app.errors import explained
@@ -20,17 +18,14 @@ from app.files.provenance import provenance
 from app.files.toml import to_plain
 from app.reconstruct.agreement import rendered_agreement
 from app.reconstruct.measure import Measurement, measure
-from app.reconstruct.presets import AUTO, check_data_term, resolved, solve_with
+from app.reconstruct.presets import AUTO, check_data_term, resolved, solved
 from app.reconstruct.presets import preset as preset_called
 from app.reconstruct.problem import known_of, problem_of
 from app.report.finding import Finding
 from app.report.page import write_report
 from core.problem import Problem
 from core.result import Solution
-from core.solve.checkpoint import CheckpointStore
-
-OnStage = Callable[[str], object]
-OnEvent = Callable[[dict[str, Any]], object]
+from core.watch import Watch
 
 
 @dataclass(frozen=True)
@@ -57,18 +52,20 @@ def reconstruct(
     folder: Path,
     preset: str = AUTO,
     *,
-    on_stage: OnStage = lambda stage: None,
-    on_event: OnEvent | None = None,
+    watch: Watch = Watch(),
     into: Path | None = None,
-    store: CheckpointStore | None = None,
-    should_stop: Callable[[], bool] | None = None,
 ) -> Reconstruction:
-    """Reconstruct the newest captures of an experiment. Raises BadInputError, SettingError.
+    """Reconstruct the newest captures of an experiment. Raises BadInputError, SettingError, StoppedError.
 
-    The result goes to a new folder among the experiment's results, or to `into`, which exists. A solver
-    that keeps checkpoints keeps them in `store` and ends soon after `should_stop` says so.
+    The result goes to a new folder among the experiment's results, or to `into`, which exists. A solver keeps in
+    `watch.store` what it can go on from; one that finds there another problem's, or other settings', starts afresh.
     """
     started = time.perf_counter()
+
+    def on_stage(stage: str) -> None:
+        watch.check_stop()
+        watch.tell({"doing": stage})
+
     experiment = open_experiment(folder)
     on_stage("read what is known")
     known = known_of(experiment)
@@ -83,7 +80,7 @@ def reconstruct(
     on_stage("check the rendered reference against the captured one")
     checked = rendered_agreement(known.scene, captures.reference)
     on_stage(f"solve ({preset})")
-    solution = solve_with(solve, problem, on_event=on_event, store=store, should_stop=should_stop)
+    solution = solved(solve, problem, watch)
     on_stage("keep the result")
     told = [known.optics, *aged(experiment, captures), *measurement.notes, checked, *solution.notes]
     result = into or _new_folder(experiment, preset)
@@ -103,6 +100,11 @@ def _new_folder(experiment: Experiment, preset: str) -> Path:
     folder = experiment.results_folder / new_id(experiment.results_folder, preset)
     folder.mkdir(parents=True)
     return folder
+
+
+def _told(value: float | str) -> float | str | None:
+    """A number as JSON has it: what is not finite is none."""
+    return value if isinstance(value, str) or math.isfinite(value) else None
 
 
 def _manifest(
@@ -143,7 +145,7 @@ def _keep(folder: Path, finding: Finding, measurement: Measurement) -> None:
         },
     )
     write_shifts(folder, measurement.shifts)
-    lines = (json.dumps({k: float(np.float64(v)) for k, v in row.items()}) for row in solution.history)
+    lines = (json.dumps({name: _told(value) for name, value in row.items()}) for row in solution.history)
     write_text(folder / "history.jsonl", "".join(line + "\n" for line in lines))
     write_manifest(folder, dict(manifest))
 

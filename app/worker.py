@@ -12,6 +12,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,6 +26,9 @@ from app.jobs.engines.process import started
 from app.jobs.errors import FencedError
 from app.jobs.folder import JobFolder, Owner, beat, try_lock
 from app.jobs.worker_status import DONE, FAILED, FENCED, NO_SPACE, STOPPED, TAKEN
+
+# How long a computation has to hear of a stop and keep what it has.
+_STOP_S = 4.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -55,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # No room even for the worker's own name: its exit status says so.
             return NO_SPACE
         threading.Thread(target=_renew, args=(folder, owner, options.lease_s), daemon=True).start()
+        threading.Thread(target=_end_soon, args=(folder, owner, stop), daemon=True).start()
         return _attempt(folder, owner, stop)
 
 
@@ -125,6 +130,17 @@ def _say_goodbye(folder: JobFolder, owner: Owner, status: int, message: str) -> 
         write_json(folder.attempt(owner.attempt) / "exit.json", content)
     except OSError as error:
         print(f"{message} (exit.json could not be written: {error})", file=sys.stderr)
+
+
+def _end_soon(folder: JobFolder, owner: Owner, stop: threading.Event) -> None:
+    """End the process where the computation does not hear of a stop: nothing interrupts a compilation.
+
+    What it has kept so far is whole, and the next attempt goes on from that.
+    """
+    stop.wait()
+    time.sleep(_STOP_S)
+    _say_goodbye(folder, owner, STOPPED, "")
+    os._exit(STOPPED)
 
 
 def _renew(folder: JobFolder, owner: Owner, lease_s: float) -> None:

@@ -1,5 +1,6 @@
 """What a solver hands back: the air on a vertex grid, how it ended, and what it cost."""
 
+from collections.abc import Mapping
 from enum import Enum
 
 import equinox as eqx
@@ -18,7 +19,6 @@ class Outcome(Enum):
         "A value became infinite or not a number; the last good state is kept. "
         "Lower the learning rate or check the boundary data."
     )
-    stopped = "Stopped on request; the checkpoint can be resumed."
 
 
 class Solution(eqx.Module):
@@ -26,7 +26,7 @@ class Solution(eqx.Module):
 
     Standard deviations are one sigma, on the same grid; `informed` is the share of the prior variance of
     T that the measurements removed (0: the model speaks alone). `history` holds one dict a recorded
-    iteration.
+    iteration: numbers, and in `doing` what was done.
     """
 
     x_m: Float[np.ndarray, " nx"]
@@ -41,5 +41,5 @@ class Solution(eqx.Module):
     informed: Float[np.ndarray, "nx ny nz"] | None = None
     outcome: Outcome = eqx.field(static=True, default=Outcome.converged)
     solver_s: float = 0.0
-    history: tuple[dict[str, float], ...] = eqx.field(static=True, default=())
+    history: tuple[Mapping[str, float | str], ...] = eqx.field(static=True, default=())
     notes: tuple[str, ...] = eqx.field(static=True, default=())

@@ -3,8 +3,9 @@
 import jax
 
 from tests.extremes.summary import pytest_runtest_logreport, pytest_terminal_summary
+from tests.memory import compiled_programs, pytest_configure
 
-__all__ = ["pytest_runtest_logreport", "pytest_terminal_summary"]
+__all__ = ["compiled_programs", "pytest_configure", "pytest_runtest_logreport", "pytest_terminal_summary"]
 
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
@@ -14,3 +15,4 @@ def pytest_addoption(parser):
     parser.addoption("--camera", help="a V4L2 device for the hardware half of the camera contract")
     parser.addoption("--projector", help="URL of a projector for the hardware half of its contract")
     parser.addoption("--extremes-table", help="write every row of tests/extremes to this file (Markdown)")
+    parser.addoption("--memory-table", help="write memory and CPU time after each module to this file")

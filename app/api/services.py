@@ -17,6 +17,7 @@ from app.calibrate.service import CalibrationDesk
 from app.capture.service import CaptureDesk
 from app.files.uploads.store import UploadLimits, UploadStore
 from app.jobs import Ledger
+from app.jobs.news import News
 from app.jobs.state import ACTIVE
 from app.kiosk.screen import KioskScreen
 from app.rig.live_camera import LiveCamera
@@ -54,8 +55,9 @@ def create_services(config: ServiceConfig) -> Services:
         stored=limits.stored_uploads,
     )
     ledger = Ledger(config.jobs_folder)
-    camera = LiveCamera(ledger.append_event, busy=lambda: bool(ledger.jobs(states=ACTIVE, limit=1)))
-    projector = LiveProjector(ledger.append_event)
+    news = News(ledger)
+    camera = LiveCamera(news.tell, busy=lambda: bool(ledger.jobs(states=ACTIVE, limit=1)))
+    projector = LiveProjector(news.tell)
     screen = KioskScreen()
     return Services(
         config,
@@ -64,12 +66,12 @@ def create_services(config: ServiceConfig) -> Services:
         Folders(config.data_root),
         Confirmed(config.data_root / "service" / "confirmed.json"),
         ledger,
-        EventFeed(ledger),
+        EventFeed(ledger, news.catch_up),
         CurveCache(ledger),
         SolutionCache(),
         camera,
-        CaptureDesk(camera, ledger.append_event),
-        CalibrationDesk(camera, screen, ledger.append_event),
+        CaptureDesk(camera, news.tell),
+        CalibrationDesk(camera, screen, news.tell),
         screen,
         projector,
     )

@@ -142,10 +142,11 @@ def _standard(cells: int) -> Prepared:
 
 def _grid(cells: int) -> Prepared:
     from core.plan.cost import grid_work
-    from core.solve.recipes import solve_grid_recipe
+    from core.solve.grid.grid import solve_grid
+    from core.solve.recipes import grid_settings
 
     problem = _problem(cells)
-    return grid_work(problem), lambda: solve_grid_recipe(problem)
+    return grid_work(problem), lambda: solve_grid(problem, grid_settings(problem))
 
 
 def _paper(steps: int) -> Prepared:

@@ -15,7 +15,7 @@ import typer
 from app.bench.parts.isolated import alone
 from app.plan.machine import this_machine
 from app.plan.make import preset_lines, signals_of, windows_of
-from app.reconstruct.presets import PRESETS, solve_with
+from app.reconstruct.presets import PRESETS
 from app.volume.file import read_volume
 from app.volume.measurement import known_planes, synthetic_problem
 from app.volume.scene import Information, RigOptions, room_scene
@@ -75,7 +75,7 @@ def solved(path: Path, options: RigOptions, information: Information, preset: st
     window_px = resolve_window_px(scene := room_scene(volume, options, information), scene.views[0])
     problem = synthetic_problem(volume, options, information, window_px=window_px, seed=1)
     noise = np.median(standard_deviation_px(problem.shifts[0]), axis=0)
-    found = solve_with(PRESETS[preset], problem)
+    found = PRESETS[preset](problem)
     scores = score_solution(found, volume)
     return {
         "noise_px": float(np.sqrt(np.mean(noise**2))),

@@ -22,6 +22,7 @@ from core.solve.grid.grid import GridSettings, solve_grid
 from core.solve.loop import LoopSettings
 from core.solve.network.mlp import MlpSolveSettings, solve_mlp
 from core.solve.regime import Regime
+from core.watch import Growing, Row, Watch
 
 
 def register(bench: typer.Typer) -> None:
@@ -67,11 +68,18 @@ class _Curve:
         self._point |= more
         self._began_s = time.process_time()
 
-    def watch(self, found: Solution) -> None:
-        """Score a state on the way."""
+    def watch(self, row: Row, growing: Growing | None) -> None:
+        """Score the air on the way."""
+        if "compile_s" in row:
+            self.begin(compile_s=round(float(row["compile_s"]), 2))
+        if growing is not None:
+            self.score(growing)
+
+    def score(self, growing: Growing) -> None:
+        """Score the air as it is now."""
         now_s = time.process_time()
         cpu_s = round(now_s - self._began_s, 2)
-        self.lines.append({**self._point, "cpu_s": cpu_s, **errors(found, self._truth)})
+        self.lines.append({**self._point, "cpu_s": cpu_s, **errors(growing(), self._truth)})
         self._began_s += time.process_time() - now_s
 
 
@@ -79,11 +87,11 @@ def run_grid(problem: Problem, truth: RoomVolume, regime: Regime, cells: int) ->
     """Twice: the first run compiles."""
     settings = GridSettings(regime=regime, cells=cells, coarsest=min(cells, 32))
     compiling, curve = (_Curve(truth, method="grid", cells=cells) for _ in range(2))
-    solve_grid(problem, settings, watch=compiling.watch)
+    solve_grid(problem, settings, Watch(compiling.watch))
     curve.begin()
-    found = solve_grid(problem, settings, watch=curve.watch)
+    found = solve_grid(problem, settings, Watch(curve.watch))
     compile_s = round(compiling.lines[-1]["cpu_s"] - curve.lines[-1]["cpu_s"], 2)
-    curve.watch(found)
+    curve.score(lambda: found)
     curve.lines[-1] |= {"compile_s": compile_s, "outcome": found.outcome.name}
     return curve.lines
 
@@ -92,11 +100,7 @@ def run_network(problem: Problem, truth: RoomVolume, settings: MlpSolveSettings)
     """Compiled before it begins."""
     curve = _Curve(truth, method="mlp")
 
-    def tell(event: dict[str, Any]) -> None:
-        if event["kind"] == "start":
-            curve.begin(compile_s=round(event["compile_s"], 2))
-
-    found = solve_mlp(problem, settings, on_event=tell, watch=curve.watch)
+    found = solve_mlp(problem, settings, Watch(curve.watch))
     best = {"method": "mlp best", **errors(found, truth), "outcome": found.outcome.name}
     return [*curve.lines, best]
 

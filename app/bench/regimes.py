@@ -114,7 +114,7 @@ def _iterations(found: Solution) -> int:
     if not found.history:
         return 0
     last = found.history[-1]
-    return int(last.get("step", sum(row.get("cg_iterations", 0.0) for row in found.history)))
+    return int(last.get("step", sum(float(row.get("cg_iterations", 0.0)) for row in found.history)))
 
 
 def draw(path: Path, truth: RoomVolume, found: dict[Regime, Solution]) -> None:

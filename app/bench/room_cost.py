@@ -22,6 +22,7 @@ from app.volume.measurement import known_planes
 from app.volume.scene import RigOptions, room_scene
 from app.volume.score import score_solution
 from core.estimate.forward_runs import ForwardRun, RoomSettings, first_profile_k, march_under, perturbed
+from core.estimate.marches import Marches
 from core.estimate.prior import Prior, room_prior
 from core.problem import Problem
 from core.result import Solution
@@ -62,7 +63,7 @@ def cost_row(volume: RoomVolume, cells: int, *, jacobian: bool) -> dict[str, flo
     start = where.at_rest(where.model(prior.mean), first_profile_k(problem, where))
     compile_s = _compiled(where, prior, start)
     began_s = time.process_time()
-    base = march_under(where, prior.mean, start, settings.settle_s, _VERTICES, _quiet)
+    base = march_under(where, prior.mean, start, settings.settle_s, _VERTICES, Marches())
     run_s = time.process_time() - began_s
     row: dict[str, float | str] = {
         "cells": "x".join(str(where.grid.cells[a]) for a in AXES),
@@ -88,9 +89,9 @@ def _from_coarse(
     start = coarse.at_rest(coarse.model(prior.mean), first_profile_k(problem, coarse))
     _compiled(coarse, prior, start)
     began_s = time.process_time()
-    start_run = march_under(coarse, prior.mean, start, settings.settle_s, _VERTICES, _quiet)
+    start_run = march_under(coarse, prior.mean, start, settings.settle_s, _VERTICES, Marches())
     flow = carried_over(start_run.flow.last, coarse.grid, where.grid)
-    base = march_under(where, prior.mean, flow, settings.refine_s, _VERTICES, _quiet)
+    base = march_under(where, prior.mean, flow, settings.refine_s, _VERTICES, Marches())
     return {"from_coarse_cpu_s": time.process_time() - began_s, "from_coarse_u_rel": _error(base, volume)}
 
 
@@ -115,10 +116,6 @@ def _error(found: ForwardRun, volume: RoomVolume) -> float:
     return float(score_solution(there, volume)["u"]["rel"])
 
 
-def _quiet(_: dict[str, float]) -> None:
-    """Tells nobody."""
-
-
 def _derivatives(
     where: Room, prior: Prior, base: ForwardRun, settings: RoomSettings, run_s: float
 ) -> dict[str, float]:
@@ -128,7 +125,7 @@ def _derivatives(
     found = {}
     for threads in (1, 2):
         wall_s, cpu_s = time.perf_counter(), time.process_time()
-        perturbed(where, prior, vector, base, replace(settings, threads=threads), _VERTICES)
+        perturbed(where, prior, vector, base, replace(settings, threads=threads), _VERTICES, Marches())
         found[threads] = (time.perf_counter() - wall_s, time.process_time() - cpu_s)
     return {
         "six_derivatives_over_run": share * found[1][1] / run_s,

@@ -98,9 +98,8 @@ def entered(problem: Problem, wrong: float, closure: str) -> Problem:
 
 def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dict[str, Any]:
     """Solve; errors, coverage, processor seconds, and what was said."""
-    reported: list[dict[str, float]] = []
     began_s = time.process_time()
-    solution = solve_room(problem, settings, on_event=reported.append)
+    solution = solve_room(problem, settings)
     cpu_s = time.process_time() - began_s
     scores = score_solution(solution, volume)
     return {
@@ -109,7 +108,12 @@ def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dic
         "T_departure": scores["T"]["departure_of_departures"],
         "p_departure": scores["p"]["rel_departure"],
         **coverage(solution, volume),
-        **{name: value for event in reported for name, value in event.items() if name.startswith("supply_")},
+        **{
+            name: value
+            for row in solution.history
+            for name, value in row.items()
+            if name.startswith("supply_")
+        },
         "cpu_s": cpu_s,
         "wall_s": solution.solver_s,
         "outcome": solution.outcome.name,

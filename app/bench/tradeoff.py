@@ -29,9 +29,10 @@ from core.problem import Problem
 from core.result import Solution
 from core.setting import SettingError
 from core.solve.draft.draft import solve_draft
+from core.solve.grid.grid import solve_grid
 from core.solve.loop import LoopSettings
 from core.solve.network.mlp import MlpSolveSettings, solve_mlp
-from core.solve.recipes import regime_for, solve_grid_recipe
+from core.solve.recipes import grid_settings, regime_for
 from core.solve.room import solve_room
 
 
@@ -153,7 +154,7 @@ def _solve(point: Point, problem: Problem) -> Solution:
     if point.method == "draft":
         return solve_draft(problem)
     if point.method == "grid":
-        return solve_grid_recipe(problem)
+        return solve_grid(problem, grid_settings(problem))
     if point.method == "mlp":
         steps = LoopSettings(time_limit_s=_NETWORK_S)
         return solve_mlp(problem, MlpSolveSettings(regime=regime_for(problem), loop=steps))

@@ -19,6 +19,7 @@ from app.experiment.calibration import read_bundle
 from app.experiment.folder import ExperimentSettings, open_experiment
 from app.files.durable import make_folder, write_text
 from app.files.lock import locked
+from app.rig.conditions import Conditions, known_pairs
 from calibration.bundle import Bundle, to_json
 from calibration.errors import CalibrationError
 from calibration.model import Model
@@ -129,6 +130,12 @@ class CalibrationFolder:
             )
 
         return self.change_bundle(change)
+
+    def note(self, conditions: Conditions) -> None:
+        """Write the conditions into the bundle, if there is one; what is not known leaves what was."""
+        known = known_pairs(conditions)
+        if known and (self.folder / "bundle.json").exists():
+            self.change_bundle(lambda bundle: dataclasses.replace(bundle, **known))
 
     def change_bundle(self, change: Callable[[Bundle], Bundle]) -> Bundle:
         """Replace the bundle by `change(bundle)`, durably; nobody else writes it in between."""

@@ -1,26 +1,32 @@
 """Guides the calibration of a service's rig: one thing at a time, in a thread, while the page looks on.
 
-States: idle -> running -> idle | failed. `take` takes the pictures of what is wanted and returns at once.
+`GUIDE` is the table of its states. `take` takes the pictures of what is wanted and returns at once.
 """
 
+import logging
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 from typing import Any
 
 from app.calibrate.folder import CalibrationFolder, StepName
 from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.calibrate.pictures import StoppedError
-from app.errors import AirlensError, BadInputError
+from app.errors import AirlensError
 from app.experiment.folder import Experiment
-from app.rig.conditions import Conditions, conditions_of, note_conditions
+from app.rig.conditions import Conditions, conditions_of
 from app.rig.live_camera import LiveCamera
 from app.rig.open import open_camera, open_stage, panel_of
 from app.rig.stage import RealStage, Stage, Task, UnopenedStage
+from app.states import Machine
 from drivers.display import PatternDisplay
 from drivers.errors import DeviceBusyError, DeviceError
+
+STOP_LIMIT_S = 30.0
+_log = logging.getLogger(__name__)
 
 
 class GuideState(StrEnum):
@@ -29,6 +35,35 @@ class GuideState(StrEnum):
     idle = "idle"
     running = "running"
     failed = "failed"
+
+
+class GuideEvent(StrEnum):
+    """What happens to the guide: `take` and `discard` are asked for."""
+
+    take = "take pictures"
+    discard = "discard"
+    end = "end"
+    fail = "fail"
+
+
+GUIDE = Machine(
+    name="A calibration",
+    table={
+        GuideState.idle: {GuideEvent.take: GuideState.running, GuideEvent.discard: GuideState.idle},
+        GuideState.failed: {GuideEvent.take: GuideState.running, GuideEvent.discard: GuideState.idle},
+        GuideState.running: {GuideEvent.end: GuideState.idle, GuideEvent.fail: GuideState.failed},
+    },
+    asked=frozenset({GuideEvent.take, GuideEvent.discard}),
+    error=DeviceBusyError,
+)
+
+
+@dataclass(eq=False)
+class _Run:
+    """Pictures that are being taken."""
+
+    abort: threading.Event = field(default_factory=threading.Event)
+    thread: threading.Thread | None = None
 
 
 @dataclass(frozen=True)
@@ -55,8 +90,7 @@ class CalibrationDesk:
         self._status = GuideStatus()
         self._skipped: dict[tuple[str, StepName], tuple[Task, ...]] = {}
         self._lock = threading.Lock()
-        self._abort = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._now: _Run | None = None
 
     @property
     def status(self) -> GuideStatus:
@@ -70,16 +104,20 @@ class CalibrationDesk:
     def take(self, experiment: Experiment, plan: LivePlan, told: Conditions) -> GuideStatus:
         """Begin with what is wanted and return at once. Raises DeviceBusyError, BadInputError."""
         with self._lock:
-            self._free()
+            state = GUIDE.after(self._status.state, GuideEvent.take)
             task = self.wanted(experiment, plan)
-            self._abort.clear()
-            name = experiment.folder.name
-            self._change(GuideStatus(GuideState.running, name, plan.step, task))
-            self._thread = threading.Thread(
-                target=self._run, args=(experiment, plan, told), name="calibration", daemon=True
-            )
-            self._thread.start()
-            return self._status
+            run = _Run()
+            work = (run, experiment, plan, told)
+            run.thread = threading.Thread(target=self._run, args=work, name="calibration", daemon=True)
+            self._now = run
+            before, self._status = self._status, GuideStatus(state, experiment.folder.name, plan.step, task)
+            try:
+                run.thread.start()
+            except RuntimeError:  # no more threads
+                self._now, self._status = None, before
+                raise
+        self._tell_status()
+        return self._status
 
     def skip(self, experiment: Experiment, plan: LivePlan) -> Task | None:
         """Do without what is wanted until the service is started anew; return what is wanted then."""
@@ -105,14 +143,21 @@ class CalibrationDesk:
             name = experiment.folder.name
             CalibrationFolder(experiment.folder).discard(plan.step, plan.camera)
             self._skipped.pop((name, plan.step), None)
-            self._change(GuideStatus())
+            self._status = GuideStatus(GUIDE.after(self._status.state, GuideEvent.discard))
             self._tell("calibration", {"experiment": name, "state": "discard", "step": plan.step.value})
 
     def stop(self) -> GuideStatus:
         """End what runs within a frame; what was taken is kept."""
-        self._abort.set()
-        if self._thread is not None:
-            self._thread.join(timeout=10)
+        with self._lock:
+            run = self._now
+        if run is None or run.thread is None:
+            return self._status
+        run.abort.set()
+        run.thread.join(timeout=STOP_LIMIT_S)
+        if self._now is run:
+            reason = f"The camera did not end its picture within {STOP_LIMIT_S:g} s. Connect it again."
+            self._live.give_up(reason)
+            self._end(run, GuideEvent.fail, reason=reason)
         return self._status
 
     def close(self) -> None:
@@ -120,8 +165,7 @@ class CalibrationDesk:
         self.stop()
 
     def _free(self) -> None:
-        if self._status.state is GuideState.running:
-            raise DeviceBusyError("A calibration is taking pictures. Wait for its end, or stop it.")
+        GUIDE.after(self._status.state, GuideEvent.take)
 
     def _asked(self, experiment: Experiment, plan: LivePlan) -> GuidedCalibration:
         """The guide without a device."""
@@ -133,24 +177,27 @@ class CalibrationDesk:
         skipped = self._skipped.get((experiment.folder.name, plan.step), ())
         return GuidedCalibration(CalibrationFolder(experiment.folder), plan, stage, skipped)
 
-    def _run(self, experiment: Experiment, plan: LivePlan, told: Conditions) -> None:
+    def _run(self, run: "_Run", experiment: Experiment, plan: LivePlan, told: Conditions) -> None:
         try:
-            issues = self._take(experiment, plan, told)
+            issues = self._take(run, experiment, plan, told)
         except StoppedError as stop:
-            self._change(replace(self._status, state=GuideState.idle, reason=str(stop)))
-        except (AirlensError, BadInputError, DeviceError, OSError) as error:
-            self._change(replace(self._status, state=GuideState.failed, reason=str(error)))
+            self._end(run, GuideEvent.end, reason=str(stop))
+        except (AirlensError, DeviceError, OSError) as error:
+            self._end(run, GuideEvent.fail, reason=str(error))
+        except Exception as error:
+            _log.exception("calibration of %s", experiment.folder.name)
+            self._end(run, GuideEvent.fail, reason=f"{type(error).__name__}: {error}. This is a defect.")
         else:
-            self._change(replace(self._status, state=GuideState.idle, issues=issues, reason=""))
+            self._end(run, GuideEvent.end, issues=issues)
 
-    def _take(self, experiment: Experiment, plan: LivePlan, told: Conditions) -> tuple[str, ...]:
+    def _take(self, run: "_Run", experiment: Experiment, plan: LivePlan, told: Conditions) -> tuple[str, ...]:
         with self._stage(experiment, plan) as stage:
             guided = self._guided(experiment, plan, stage)
             guided.resume()
-            issues = guided.take(self._progress, self._abort.is_set)
+            issues = guided.take(partial(self._progress, run), run.abort.is_set)
             in_use = guided.finish()
         if in_use:
-            note_conditions(CalibrationFolder(experiment.folder), conditions_of(experiment.settings, told))
+            CalibrationFolder(experiment.folder).note(conditions_of(experiment.settings, told))
         return issues
 
     @contextmanager
@@ -169,13 +216,30 @@ class CalibrationDesk:
         with self._live.using() as camera:
             yield RealStage(camera, None if panel is None else self._screen, panel)
 
-    def _progress(self, done: int, total: int) -> None:
-        self._change(replace(self._status, done=done, total=total))
-
-    def _change(self, status: GuideStatus) -> None:
-        told = (self._status.state, self._status.done // 10) != (status.state, status.done // 10)
-        self._status = status
+    def _progress(self, run: "_Run", done: int, total: int) -> None:
+        with self._lock:
+            if self._now is not run:
+                return
+            told = self._status.done // 10 != done // 10
+            self._status = replace(self._status, done=done, total=total)
         if told:
-            names = ("experiment", "done", "total", "reason")
-            body = {"state": status.state.value, "step": status.step and status.step.value}
-            self._tell("calibration", body | {name: getattr(status, name) for name in names})
+            self._tell_status()
+
+    def _end(
+        self, run: "_Run", event: GuideEvent, *, issues: tuple[str, ...] | None = None, reason: str = ""
+    ) -> None:
+        """Leave the running state, once."""
+        with self._lock:
+            if self._now is not run:
+                return
+            self._now = None
+            state = GUIDE.after(self._status.state, event)
+            kept = self._status.issues if issues is None else issues
+            self._status = replace(self._status, state=state, issues=kept, reason=reason)
+        self._tell_status()
+
+    def _tell_status(self) -> None:
+        status = self._status
+        names = ("experiment", "done", "total", "reason")
+        body = {"state": status.state.value, "step": status.step and status.step.value}
+        self._tell("calibration", body | {name: getattr(status, name) for name in names})

@@ -1,9 +1,11 @@
 """Takes captures for somebody who watches: one at a time, in a thread, while the live picture stays alive.
 
-States: idle -> running -> finished | aborted | incomplete | failed. Abort acts within a frame; then what was
-taken is kept or discarded, as asked.
+`CAPTURE` is the table of its states: running ends as finished, aborted, incomplete or failed, and from each of
+these the next capture may start. Abort acts within a frame; then what was taken is kept or discarded, as asked.
+A capture is on record (its folder) before it is said to run: so a kill leaves it in the list as interrupted.
 """
 
+import logging
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -14,13 +16,18 @@ from typing import Any
 
 from app.capture.burst import OnAbort, Order, TakenBurst, Watch, take_order
 from app.errors import AirlensError
+from app.experiment.captures import release, reserve
 from app.experiment.folder import Experiment, new_id
 from app.rig.live_camera import LiveCamera
 from app.rig.open import AirState, air_of, open_camera
+from app.states import Machine
 from drivers.burst import BurstOutcome, Progress
 from drivers.errors import DeviceBusyError, DeviceError
+from drivers.protocols import Camera
 
 TOLD_EVERY_S = 1.0
+ABORT_LIMIT_S = 30.0
+_log = logging.getLogger(__name__)
 
 
 class DeskState(StrEnum):
@@ -34,11 +41,36 @@ class DeskState(StrEnum):
     failed = "failed"
 
 
+class CaptureEvent(StrEnum):
+    """What happens to the desk: `start` and `abort` are asked for."""
+
+    start = "start"
+    complete = "complete"
+    abort = "abort"
+    cut_short = "cut short"
+    fail = "fail"
+
+
+_S, _E = DeskState, CaptureEvent
+CAPTURE = Machine(
+    name="A capture",
+    table={
+        _S.running: {
+            _E.complete: _S.finished,
+            _E.abort: _S.aborted,
+            _E.cut_short: _S.incomplete,
+            _E.fail: _S.failed,
+        },
+        **{state: {_E.start: _S.running} for state in DeskState if state is not _S.running},
+    },
+    asked=frozenset({_E.start, _E.abort}),
+    error=DeviceBusyError,
+)
 OUTCOMES = {
-    BurstOutcome.COMPLETE: DeskState.finished,
-    BurstOutcome.ABORTED: DeskState.aborted,
-    BurstOutcome.DEVICE_LOST: DeskState.incomplete,
-    BurstOutcome.TOO_MANY_REFUSED: DeskState.incomplete,
+    BurstOutcome.COMPLETE: _E.complete,
+    BurstOutcome.ABORTED: _E.abort,
+    BurstOutcome.DEVICE_LOST: _E.cut_short,
+    BurstOutcome.TOO_MANY_REFUSED: _E.cut_short,
 }
 
 
@@ -59,16 +91,33 @@ class DeskStatus:
     reason: str = ""
 
 
-class CaptureDesk:
-    """Takes captures with the camera of `live`; `tell(kind, body)` hears of state and progress."""
+@dataclass(eq=False)
+class _Run:
+    """One order that is carried out; `stop` says what becomes of the frames once it is to end."""
 
-    def __init__(self, live: LiveCamera, tell: Callable[[str, Mapping[str, Any]], object]) -> None:
-        self._live = live
-        self._tell = tell
+    experiment: Experiment
+    order: Order
+    name: str
+    stop: OnAbort | None = None
+    thread: threading.Thread | None = None
+
+
+class CaptureDesk:
+    """Takes captures with the camera of `live`; `tell(kind, body)` hears of state and progress, and never raises.
+
+    `opener` opens the camera of an experiment.
+    """
+
+    def __init__(
+        self,
+        live: LiveCamera,
+        tell: Callable[[str, Mapping[str, Any]], object],
+        opener: Callable[[Experiment, AirState], Camera] = open_camera,
+    ) -> None:
+        self._live, self._tell, self._opener = live, tell, opener
         self._status = DeskStatus()
-        self._stop: OnAbort | None = None
-        self._lock = threading.Lock()
-        self._thread: threading.Thread | None = None
+        self._lock = threading.RLock()
+        self._now: _Run | None = None
         self._told_s = 0.0
 
     @property
@@ -77,46 +126,101 @@ class CaptureDesk:
         return self._status
 
     def start(self, experiment: Experiment, order: Order) -> DeskStatus:
-        """Begin a capture and return at once. Raises DeviceBusyError while another one runs."""
+        """Begin a capture and return at once; its folder is then on the disk, as an interrupted capture's.
+
+        Raises DeviceBusyError while another one runs, OSError when the disk takes no folder.
+        """
         with self._lock:
-            if self._status.state is DeskState.running:
-                raise DeviceBusyError("A capture is running. Wait for its end, or abort it.")
-            self._stop = None
+            state = CAPTURE.after(self._status.state, CaptureEvent.start)
             plan = order.plan
             name = new_id(experiment.captures_folder, plan.role)
+            reserve(experiment.captures_folder / name, plan)
+            run = _Run(experiment, order, name)
+            run.thread = threading.Thread(target=self._run, args=(run,), name="capture", daemon=True)
+            self._now = run
             folder = experiment.folder.name
-            status = DeskStatus(DeskState.running, folder, name, plan.role, plan.frames, order.bursts)
-            self._change(status)
-            self._thread = threading.Thread(
-                target=self._run, args=(experiment, order, name), name="capture", daemon=True
-            )
-            self._thread.start()
-            return status
+            status = DeskStatus(state, folder, name, plan.role, plan.frames, order.bursts)
+            self._status = status
+            try:
+                run.thread.start()
+            except RuntimeError as error:  # no more threads
+                release(experiment.captures_folder / name)
+                self._end(run, CaptureEvent.fail, f"{error}. Close other programs, then take it again.")
+                return self._status
+        self._tell_status()
+        return status
 
     def abort(self, discard: bool) -> DeskStatus:
-        """End the running capture within a frame; `discard` removes what was taken."""
-        self._stop = "discard" if discard else "keep"
-        if self._thread is not None:
-            self._thread.join(timeout=10)
+        """End the running capture within a frame; `discard` removes what was taken.
+
+        One that does not end in time is left behind, with its camera: the next one can begin.
+        """
+        with self._lock:
+            run = self._now
+        if run is None or run.thread is None:
+            return self._status
+        run.stop = "discard" if discard else "keep"
+        run.thread.join(timeout=ABORT_LIMIT_S)
+        if self._now is run:
+            reason = f"The camera did not end the capture within {ABORT_LIMIT_S:g} s. Connect it again."
+            self._live.give_up(reason)
+            self._end(run, CaptureEvent.abort, f"{reason} Frames that were kept are in {run.name}.")
+        return self._status
+
+    def wait(self, limit_s: float) -> DeskStatus:
+        """Wait until the running capture has ended, at most so long."""
+        with self._lock:
+            run = self._now
+        if run is not None and run.thread is not None:
+            run.thread.join(timeout=limit_s)
         return self._status
 
     def close(self) -> None:
         """Abort and keep."""
         self.abort(discard=False)
 
-    def _run(self, experiment: Experiment, order: Order, name: str) -> None:
-        watch = Watch(
-            self._progress, lambda taken: self._live.show(taken.frame), lambda: self._stop, self._begun
-        )
+    def _run(self, run: _Run) -> None:
         try:
-            self._connect(experiment, air_of(order.plan.role))
-            with self._live.using() as camera:
-                taken = take_order(camera, experiment, order, watch, name)
+            event, reason = self._take(run)
         except (AirlensError, DeviceError, OSError) as error:
-            self._change(replace(self._status, state=DeskState.failed, reason=str(error)))
-            return
-        state, reason = _ending(order, taken)
-        self._change(replace(self._status, state=state, reason=reason))
+            event, reason = CaptureEvent.fail, str(error)
+        except Exception as error:
+            _log.exception("capture %s", run.name)
+            event, reason = CaptureEvent.fail, f"{type(error).__name__}: {error}. This is a defect."
+        release(run.experiment.captures_folder / run.name)
+        self._end(run, event, reason)
+
+    def _take(self, run: _Run) -> tuple[CaptureEvent, str]:
+        watch = Watch(
+            self._following(run, self._progress),
+            lambda taken: self._live.show(taken.frame),
+            lambda: run.stop,
+            self._following(run, self._begun),
+        )
+        self._connect(run.experiment, air_of(run.order.plan.role))
+        with self._live.using() as camera:
+            taken = take_order(camera, run.experiment, run.order, watch, run.name)
+        return _ending(run.order, taken)
+
+    def _following(self, run: _Run, act: Callable[[Any], object]) -> Callable[[Any], object]:
+        """Let a run that was left behind tell nothing more."""
+
+        def follow(told: Any) -> None:
+            with self._lock:
+                if self._now is run:
+                    act(told)
+
+        return follow
+
+    def _end(self, run: _Run, event: CaptureEvent, reason: str) -> None:
+        """Leave the running state, once."""
+        with self._lock:
+            if self._now is not run:
+                return
+            self._now = None
+            state = CAPTURE.after(self._status.state, event)
+            self._status = replace(self._status, state=state, reason=reason)
+        self._tell_status()
 
     def _connect(self, experiment: Experiment, air: AirState) -> None:
         """Open the rig's camera unless it is; a simulated room is told what its air does."""
@@ -127,7 +231,7 @@ class CaptureDesk:
             source,
             air if simulated else self._live.air,
         ):
-            self._live.open(source, lambda: open_camera(experiment, air), air)
+            self._live.open(source, lambda: self._opener(experiment, air), air)
 
     def _begun(self, folder: Path) -> None:
         now = self._status
@@ -142,23 +246,25 @@ class CaptureDesk:
             refused=progress.refused,
             level=progress.level,
         )
-        if time.monotonic() - self._told_s > TOLD_EVERY_S:
-            self._change(status)
-        else:
-            self._status = status
+        self._change(status, told=time.monotonic() - self._told_s > TOLD_EVERY_S)
 
-    def _change(self, status: DeskStatus) -> None:
-        self._status = status
-        self._told_s = time.monotonic()
+    def _change(self, status: DeskStatus, told: bool = True) -> None:
+        with self._lock:
+            self._status = status
+        if told:
+            self._tell_status()
+
+    def _tell_status(self) -> None:
+        status, self._told_s = self._status, time.monotonic()
         names = ("experiment", "capture", "role", "burst", "bursts", "done", "total", "reason")
         self._tell("capture", {"state": status.state.value} | {name: getattr(status, name) for name in names})
 
 
-def _ending(order: Order, taken: list[TakenBurst]) -> tuple[DeskState, str]:
+def _ending(order: Order, taken: list[TakenBurst]) -> tuple[CaptureEvent, str]:
     """How an order ended, by its last burst."""
     if not taken:
-        return DeskState.aborted, "Stopped before the first burst; nothing was taken."
+        return CaptureEvent.abort, "Stopped before the first burst; nothing was taken."
     last = taken[-1]
     if last.shortfall or len(taken) == order.bursts:
         return OUTCOMES[last.burst.outcome], last.shortfall
-    return DeskState.aborted, f"Stopped after {len(taken)} of {order.bursts} bursts; they are kept."
+    return CaptureEvent.abort, f"Stopped after {len(taken)} of {order.bursts} bursts; they are kept."

@@ -2,17 +2,19 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.progress import Progress as Bar
 
 from app.errors import AirlensError
-from drivers.burst import CaptureRole
+
+if TYPE_CHECKING:
+    from drivers.burst import CaptureRole
 
 Folder = Annotated[Path, typer.Argument(help="Experiment folder, whose rig names the camera.")]
 OnAbort = Literal["keep", "discard"]
-_ROLES: dict[CaptureRole, str] = {
+_ROLES: "dict[CaptureRole, str]" = {
     "reference": "Take the reference: still air.",
     "flow": "Take the flow image, or a sequence of them.",
     "dark": "Take dark frames: lens covered.",
@@ -30,7 +32,7 @@ def register(cli: typer.Typer) -> None:
     cli.add_typer(group, name="capture")
 
 
-def _command(role: CaptureRole):
+def _command(role: "CaptureRole"):
     def command(
         experiment: Folder,
         frames: Annotated[int, typer.Option(min=1, help="Frames in the mean.")] = 100,

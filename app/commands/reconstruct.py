@@ -1,11 +1,23 @@
 """`airlens reconstruct`."""
 
+import contextlib
 import json
+import shutil
+import signal
+import threading
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
 
 # Known here by name, so that a shell completes them without what they solve with.
 PRESETS = ("auto", "draft", "standard", "reference", "grid", "paper")
@@ -28,22 +40,23 @@ def reconstruct(
     ] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Reconstruct the air from the newest reference and flow captures."""
+    """Reconstruct the air from the newest reference and flow captures. Ctrl-C stops; the same command goes on."""
+    from app.experiment.folder import open_experiment
+    from app.jobs.checkpoints import FolderStore
     from app.pipeline import reconstruct as run
+    from core.watch import StoppedError, Watch
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, transient=True, disable=as_json) as progress:
-        task = progress.add_task("start", total=None)
-        current = ["start"]
-
-        def stage(name: str) -> None:
-            current[0] = name
-            progress.update(task, description=name)
-
-        def event(row: dict[str, Any]) -> None:
-            progress.update(task, description=f"{current[0]}: iteration {row.get('iteration', 0):.0f}")
-
-        done = run(experiment, preset, on_stage=stage, on_event=event)
+    kept = open_experiment(experiment).checkpoint_folder
+    store = FolderStore(kept)
+    if len(store) > 0:
+        typer.echo(f"Going on from {kept}, where captures and settings are the same.", err=True)
+    try:
+        with _progress(quiet=as_json) as told, _interruptible() as stop:
+            done = run(experiment, preset, watch=Watch(told, stop.is_set, store))
+    except StoppedError:
+        typer.echo(f"Stopped. What was done is kept in {kept}; the same command goes on from it.", err=True)
+        raise typer.Exit(130) from None
+    shutil.rmtree(kept, ignore_errors=True)
     summary = {
         "result": str(done.folder / "result.nc"),
         "report": done.no_report or str(done.folder / "report.html"),
@@ -57,3 +70,52 @@ def reconstruct(
     else:
         typer.echo(f"{summary['outcome']}: {summary['advice']} Solver {done.solution.solver_s:.1f} s.")
         typer.echo(f"result {summary['result']}\nreport {summary['report']}")
+
+
+class _Shown:
+    """Shows on a bar what is being done, and how much of it is done where the solver can tell."""
+
+    def __init__(self, bar: Progress) -> None:
+        self._bar, self._task = bar, bar.add_task("start", total=None)
+
+    def __call__(self, row: Mapping[str, float | str], growing: object) -> None:
+        share = row.get("share")
+        if isinstance(share, float):
+            self._bar.update(self._task, total=1.0, completed=share)
+        self._bar.update(self._task, description=str(row["doing"]))
+        if str(row["doing"]).startswith("start afresh"):
+            self._bar.console.print(f"{row['doing']}.")
+
+
+@contextlib.contextmanager
+def _progress(*, quiet: bool) -> Iterator[_Shown]:
+    words = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    with Progress(*words, TimeElapsedColumn(), transient=True, disable=quiet) as bar:
+        yield _Shown(bar)
+
+
+@contextlib.contextmanager
+def _interruptible() -> Iterator[threading.Event]:
+    """Set the event at the first Ctrl-C or SIGTERM; a second one ends the program at once, which loses little."""
+    stop = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+    former = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def asked(*_: object) -> None:
+        typer.echo("Stopping; a compilation is waited for. Once more stops at once.", err=True)
+        stop.set()
+        _restore(former)
+
+    for number in former:
+        signal.signal(number, asked)
+    try:
+        yield stop
+    finally:
+        _restore(former)
+
+
+def _restore(former: Mapping[signal.Signals, object]) -> None:
+    for number, handler in former.items():
+        signal.signal(number, handler)  # pyright: ignore[reportArgumentType]

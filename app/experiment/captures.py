@@ -10,6 +10,7 @@
 A folder without a manifest is an interrupted capture: what it holds can be read, and is never a measurement.
 """
 
+import contextlib
 import hashlib
 import os
 import shutil
@@ -22,7 +23,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from app.errors import BadInputError
+from app.errors import AirlensError, BadInputError
 from app.experiment.capture_files import BurstImage, RawStack, decode_image, read_image, write_image
 from app.experiment.folder import Experiment, parse_manifest, write_manifest
 from app.files.durable import make_folder, sync, write_json
@@ -166,6 +167,35 @@ def _kept_image(folder: Path, view: Mapping[str, Any], read: dict[str, str]) -> 
     return decode_image(content, path)
 
 
+def reserve(folder: Path, plan: CapturePlan) -> None:
+    """Make the folder of a capture that is about to begin: from now on a crash leaves it as an interrupted one.
+
+    Nothing stays when the disk refuses it (OSError). Raises BadInputError when the experiment is gone.
+    """
+    if not folder.parent.parent.is_dir():
+        raise BadInputError(
+            f"There is no {folder.parent.parent} any more: nothing can be taken into it. Restore the experiment, "
+            "or make another one."
+        )
+    make_folder(folder.parent)
+    folder.mkdir()
+    try:
+        sync(folder.parent)
+        started = datetime.now(UTC).isoformat(timespec="seconds")
+        about = {"role": plan.role, "plan": to_plain(plan), "started": started, "process": os.getpid()}
+        write_json(folder / "incomplete.json", about)
+    except OSError:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def release(folder: Path) -> None:
+    """Remove the folder of a capture that never had a frame; any other one stays as it is."""
+    with contextlib.suppress(OSError):
+        if [path.name for path in folder.iterdir()] == ["incomplete.json"]:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
 class CaptureRecorder:
     """Follows a burst while it runs, so that a crash leaves what was taken before, marked as incomplete.
 
@@ -173,12 +203,8 @@ class CaptureRecorder:
     """
 
     def __init__(self, folder: Path, plan: CapturePlan, checkpoint_s: float = CHECKPOINT_S) -> None:
-        make_folder(folder.parent)
-        folder.mkdir()
-        sync(folder.parent)
-        started = datetime.now(UTC).isoformat(timespec="seconds")
-        about = {"role": plan.role, "plan": to_plain(plan), "started": started, "process": os.getpid()}
-        write_json(folder / "incomplete.json", about)
+        if not (folder / "incomplete.json").exists():
+            reserve(folder, plan)
         self.folder, self._checkpoint_s = folder, checkpoint_s
         self._saved_s = float("-inf")
         self._stack = RawStack(folder / "frames.tif") if plan.raw_stack else None
@@ -190,6 +216,7 @@ class CaptureRecorder:
         began_s = time.monotonic()
         if began_s - self._saved_s < self._checkpoint_s:
             return
+        self._check()
         full_scale = taken.frame.full_scale_counts
         moments = taken.moments
         image = BurstImage(moments.mean(full_scale), moments.std(full_scale), moments.frames)
@@ -201,6 +228,7 @@ class CaptureRecorder:
     def keep(self, burst: Burst, origin: Mapping[str, Any] | None = None) -> Path:
         """Finish the folder. What the device cut short gets no manifest: it is never a measurement."""
         self._close()
+        self._check()
         if burst.outcome in (BurstOutcome.COMPLETE, BurstOutcome.ABORTED):
             return write_capture(self.folder, burst, origin=origin)
         write_image(self.folder / "partial.tif", BurstImage(burst.mean, burst.std, burst.frames))
@@ -217,6 +245,14 @@ class CaptureRecorder:
         self._close()
         if not any((self.folder / name).exists() for name in ("partial.tif", "manifest.json")):
             shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _check(self) -> None:
+        """Raise AirlensError when somebody has removed the folder: what is written now would be of no use."""
+        if not (self.folder / "incomplete.json").exists():
+            raise AirlensError(
+                f"The folder {self.folder} was removed while its capture was taken; nothing of it is kept. "
+                "Take it again."
+            )
 
     def _close(self) -> None:
         if self._stack:

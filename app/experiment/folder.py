@@ -4,6 +4,7 @@
     calibration/bundle.json    models, with units, date, quality
     captures/<id>/             manifest.json (written last), reference.tif or flow.tif
     results/<id>/              result.nc, report.html, manifest.json (written last)
+    checkpoint/                a reconstruction that was stopped: `airlens reconstruct` goes on from it
     truth.npz                  simulated experiments only: the room that the twin looks at
 
 A folder without a manifest is an interrupted one: listed as such, never used as a result.
@@ -11,9 +12,10 @@ A folder without a manifest is an interrupted one: listed as such, never used as
 
 import errno
 import hashlib
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Literal
 
@@ -26,6 +28,7 @@ from core.scene import Scene
 
 SETTINGS_FILE = "experiment.toml"
 WHAT_TO_DO = "Remove the folder, or restore it from a copy."
+_MOMENT = "%Y%m%dT%H%M%S"
 
 
 class ExperimentSettings(Strict):
@@ -60,6 +63,11 @@ class Experiment:
     def results_folder(self) -> Path:
         """One folder a result."""
         return self.folder / "results"
+
+    @property
+    def checkpoint_folder(self) -> Path:
+        """What `airlens reconstruct` goes on from; gone when it has ended."""
+        return self.folder / "checkpoint"
 
     def file(self, name: str) -> Path:
         """A file that the settings name, inside the folder. Raises BadInputError for a path outside it."""
@@ -132,13 +140,22 @@ def save_settings(folder: Path, settings: ExperimentSettings) -> Experiment:
 
 
 def new_id(parent: Path, stem: str) -> str:
-    """A fresh, sortable folder name: time, then what it is."""
-    moment = datetime.now(UTC).strftime("%Y%m%dT%H%M%S")
-    candidate, number = f"{moment}-{stem}", 1
-    while (parent / candidate).exists():
-        number += 1
-        candidate = f"{moment}-{number:02d}-{stem}"
-    return candidate
+    """A fresh folder name: time, then what it is. It sorts after every name that is there.
+
+    Two within a second, and one after the clock was set back, are named by the second after the newest.
+    """
+    moment = datetime.fromtimestamp(int(time.time()), UTC)
+    there = [found for path in parent.glob("*-*") if (found := _moment_of(path.name)) is not None]
+    if there:
+        moment = max(moment, max(there) + timedelta(seconds=1))
+    return f"{moment.strftime(_MOMENT)}-{stem}"
+
+
+def _moment_of(name: str) -> datetime | None:
+    try:
+        return datetime.strptime(name.partition("-")[0], _MOMENT).replace(tzinfo=UTC)
+    except ValueError:
+        return None
 
 
 def new_folder(parent: Path, stem: str, fill: Callable[[Path], object]) -> Path:

@@ -1,34 +1,45 @@
-"""A solver's checkpoints in the folder of its attempt: written durably, the last two kept."""
+"""A folder as a store of named blobs: what a solver keeps in it is there, whole, after a kill or a power cut."""
 
-import itertools
-import time
+from collections.abc import Iterator, MutableMapping
 from pathlib import Path
 
 from app.files.durable import write_durably
 
-KEPT = 2
+_SUFFIX = ".checkpoint"
 
 
-class FolderStore:
-    """Bytes in, bytes out, as `core.solve.checkpoint.CheckpointStore` asks; files are numbered upwards."""
+class FolderStore(MutableMapping[str, bytes]):
+    """A `core.watch.Store`: one file a name, made by one rename. The folder is made with the first of them."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        numbers = [int(path.stem) for path in self._files()]
-        self._numbers = itertools.count(max(numbers, default=0) + 1)
-        self.saved_s = 0.0
 
-    def save(self, content: bytes) -> None:
-        """Keep a checkpoint; the one before the one before goes."""
-        path = self._folder / f"{next(self._numbers):08d}.checkpoint"
-        write_durably(path, lambda temporary: temporary.write_bytes(content))
-        self.saved_s = time.time()
-        for old in self._files()[KEPT:]:
-            old.unlink()
+    def __getitem__(self, name: str) -> bytes:
+        """Return a blob. Raises KeyError."""
+        try:
+            return self._path(name).read_bytes()
+        except FileNotFoundError:
+            raise KeyError(name) from None
 
-    def load(self) -> list[bytes]:
-        """Return what is there, newest first."""
-        return [path.read_bytes() for path in self._files()]
+    def __setitem__(self, name: str, content: bytes) -> None:
+        """Keep a blob durably, in place of the one of that name."""
+        write_durably(self._path(name), lambda temporary: temporary.write_bytes(content))
 
-    def _files(self) -> list[Path]:
-        return sorted(self._folder.glob("[0-9]*.checkpoint"), reverse=True)
+    def __delitem__(self, name: str) -> None:
+        """Remove a blob. Raises KeyError."""
+        try:
+            self._path(name).unlink()
+        except FileNotFoundError:
+            raise KeyError(name) from None
+
+    def __iter__(self) -> Iterator[str]:
+        """Names in their order; a file that is being written has none yet."""
+        paths = sorted(self._folder.glob(f"*{_SUFFIX}"))
+        return iter([path.stem for path in paths if not path.name.startswith(".")])
+
+    def __len__(self) -> int:
+        """How many blobs there are."""
+        return sum(1 for _ in self)
+
+    def _path(self, name: str) -> Path:
+        return self._folder / f"{name}{_SUFFIX}"

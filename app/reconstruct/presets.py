@@ -1,27 +1,29 @@
 """Named ways to solve: what each costs and what it bought is in README, measured by `airlens bench`."""
 
-import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Protocol
 
 from app.errors import BadInputError
+from core.checkpoint import ForeignCheckpointError
 from core.known import level_of
 from core.problem import Problem
 from core.result import Solution
 from core.scene import Scene
 from core.solve.draft.draft import solve_draft
-from core.solve.recipes import solve_grid_recipe, solve_paper
+from core.solve.draft.temperature_prior import TemperatureSettings
+from core.solve.grid.grid import solve_grid
+from core.solve.network.mlp import solve_mlp
+from core.solve.recipes import grid_settings, paper_settings
 from core.solve.room import RoomSettings, solve_room
-
-OnEvent = Callable[[dict[str, Any]], object]
+from core.watch import Watch
 
 
 class Solve(Protocol):
-    """A road from a problem to the air."""
+    """A road from a problem to the air: a solver with its settings."""
 
-    def __call__(self, problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
-        """Solve, reporting every recorded iteration."""
+    def __call__(self, problem: Problem, watch: Watch = Watch()) -> Solution:
+        """Solve; `watch` is told of it, may stop it, and keeps what it can go on from."""
         ...
 
 
@@ -32,14 +34,29 @@ STANDARD = RoomSettings()
 REFERENCE = RoomSettings(cells=64, coarse_cells=40, restart_s=80.0, rounds=16, renewals=4)
 
 
-def solve_standard(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+def draft(problem: Problem, watch: Watch = Watch()) -> Solution:
+    """Temperature in at most some ten seconds."""
+    return solve_draft(problem, TemperatureSettings(), watch)
+
+
+def grid(problem: Problem, watch: Watch = Watch()) -> Solution:
+    """All losses on the grid; `scene.solve.grid` cells an axis, 32 by default."""
+    return solve_grid(problem, grid_settings(problem), watch)
+
+
+def paper(problem: Problem, watch: Watch = Watch()) -> Solution:
+    """The paper's recipe: AdaBelief, 80,000 iterations, batches of 8192, 5000 and 4096, 64 vertices."""
+    return solve_mlp(problem, paper_settings(problem), watch)
+
+
+def standard(problem: Problem, watch: Watch = Watch()) -> Solution:
     """The room marched at 48^3, its boundary corrected by the images: minutes."""
-    return solve_room(problem, sized(STANDARD, problem.scene), on_event=on_event)
+    return solve_room(problem, sized(STANDARD, problem.scene), watch)
 
 
-def solve_reference(problem: Problem, *, on_event: OnEvent | None = None) -> Solution:
+def reference(problem: Problem, watch: Watch = Watch()) -> Solution:
     """The same at 64^3 and longer."""
-    return solve_room(problem, sized(REFERENCE, problem.scene), on_event=on_event)
+    return solve_room(problem, sized(REFERENCE, problem.scene), watch)
 
 
 def sized(settings: RoomSettings, scene: Scene) -> RoomSettings:
@@ -49,12 +66,23 @@ def sized(settings: RoomSettings, scene: Scene) -> RoomSettings:
 
 
 PRESETS: Mapping[str, Solve] = {
-    "draft": solve_draft,
-    "grid": solve_grid_recipe,
-    "paper": solve_paper,
-    "standard": solve_standard,
-    "reference": solve_reference,
+    "draft": draft,
+    "grid": grid,
+    "paper": paper,
+    "standard": standard,
+    "reference": reference,
 }
+
+
+def solved(solve: Solve, problem: Problem, watch: Watch) -> Solution:
+    """Solve, going on from what is kept; afresh, and told so, where that is of another problem or other settings."""
+    try:
+        return solve(problem, watch)
+    except ForeignCheckpointError:
+        watch.tell({"doing": "start afresh: what was kept is of other captures or other settings"})
+        if watch.store is not None:
+            watch.store.clear()
+        return solve(problem, watch)
 
 
 def resolved(name: str, scene: Scene) -> str:
@@ -88,9 +116,3 @@ def check_data_term(name: str, scene: Scene) -> None:
             f"solve.data_term is 'warped', but the preset {name!r} works on displacements of windows. "
             "Take the preset grid, or data_term = 'displacement'."
         )
-
-
-def solve_with(solve: Solve, problem: Problem, **given: Any) -> Solution:
-    """Solve, handing on what this solver takes of `on_event`, `store` and `should_stop`."""
-    taken = inspect.signature(solve).parameters
-    return solve(problem, **{name: value for name, value in given.items() if name in taken})

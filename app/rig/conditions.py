@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from app.calibrate.folder import CalibrationFolder
 from app.experiment.folder import ExperimentSettings
 from app.rig.projectors import lamp_journal
 from drivers.projector.lamp_guard import LampGuard
@@ -50,12 +49,3 @@ def known_pairs(conditions: Conditions) -> dict[str, float]:
 def conditions_in(content: Mapping[str, Any]) -> Conditions:
     """What `known_pairs` wrote."""
     return Conditions(content.get("ambient_temperature_k"), content.get("minutes_on"))
-
-
-def note_conditions(calibration: CalibrationFolder, conditions: Conditions) -> None:
-    """Write the conditions into the bundle, if there is one; what is not known leaves what was."""
-    if not (calibration.folder / "bundle.json").exists():
-        return
-    known = known_pairs(conditions)
-    if known:
-        calibration.change_bundle(lambda bundle: dataclasses.replace(bundle, **known))

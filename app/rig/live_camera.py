@@ -1,18 +1,28 @@
 """One open camera that many may watch and one may use: a thread grabs while somebody looks, newest wins.
 
-States: closed -> opening -> ready <-> capturing; any -> failed (unplugged, timed out) -> opening again.
+`CAMERA` is the table of its states: what may happen in which, and where that leads. What it does not name is
+refused. A camera that fails or hangs is left behind, and can be connected again.
 """
 
 import contextlib
+import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
 from app.rig.frame_statistics import LiveFrame, jpeg_of, statistics_of
-from drivers.errors import DeviceBusyError, DeviceError, DeviceNotFoundError, DeviceSettingError, FrameError
+from app.states import Machine
+from drivers.errors import (
+    DeviceBusyError,
+    DeviceError,
+    DeviceNotFoundError,
+    DeviceSettingError,
+    DeviceTimeoutError,
+    FrameError,
+)
 from drivers.protocols import Camera, Frame
 from drivers.settings import set_on
 
@@ -20,6 +30,8 @@ LONGEST_RATE_HZ = 30.0
 # While this machine computes: enough for the eyes, and a third of the cost.
 BUSY_RATE_HZ = 10.0
 ASK_EVERY_S = 1.0
+ANSWER_LIMIT_S = 10.0
+_log = logging.getLogger(__name__)
 
 
 class CameraState(StrEnum):
@@ -30,6 +42,44 @@ class CameraState(StrEnum):
     ready = "ready"
     capturing = "capturing"
     failed = "failed"
+
+
+class CameraEvent(StrEnum):
+    """What happens to the camera: `connect` and `disconnect` are asked for."""
+
+    connect = "connect"
+    opened = "be opened"
+    take = "take with it"
+    give_back = "give back"
+    lose = "lose"
+    disconnect = "disconnect"
+    give_up = "give up"
+
+
+_S, _E = CameraState, CameraEvent
+CAMERA = Machine(
+    name="The camera",
+    table={
+        _S.closed: {_E.connect: _S.opening, _E.disconnect: _S.closed, _E.give_up: _S.closed},
+        _S.opening: {
+            _E.opened: _S.ready,
+            _E.lose: _S.failed,
+            _E.disconnect: _S.closed,
+            _E.give_up: _S.failed,
+        },
+        _S.ready: {
+            _E.connect: _S.opening,
+            _E.take: _S.capturing,
+            _E.lose: _S.failed,
+            _E.disconnect: _S.closed,
+            _E.give_up: _S.failed,
+        },
+        _S.capturing: {_E.give_back: _S.ready, _E.lose: _S.failed, _E.give_up: _S.failed},
+        _S.failed: {_E.connect: _S.opening, _E.disconnect: _S.closed, _E.give_up: _S.failed},
+    },
+    asked=frozenset({_E.connect, _E.disconnect}),
+    error=DeviceBusyError,
+)
 
 
 @dataclass(frozen=True)
@@ -57,6 +107,16 @@ class _Wish:
     gain: float | None = None
 
 
+@dataclass(eq=False)
+class _Opened:
+    """An open camera. One at a time speaks to it; who hangs in it hangs alone once it has `ended`."""
+
+    camera: Camera
+    use: threading.Lock = field(default_factory=threading.Lock)
+    ended: bool = False
+    status: CameraStatus | None = None
+
+
 class LiveCamera:
     """The one camera of a service. `tell(kind, body)` hears of every change of state.
 
@@ -71,17 +131,19 @@ class LiveCamera:
     ) -> None:
         self._tell = tell
         self._busy, self._asked_s, self._rate_hz = busy, float("-inf"), LONGEST_RATE_HZ
-        self._camera: Camera | None = None
+        self._guard = threading.RLock()  # of the fields below, held for moments
         self._status = CameraStatus(CameraState.closed)
-        self._use = threading.Lock()  # one at a time speaks to the device
+        self._told: tuple[CameraState, str] = (CameraState.closed, "")
+        self._opened: _Opened | None = None
+        self._opener: object = (
+            None  # who may speak of the camera's state: the newest opening, then its camera
+        )
         self._frame: LiveFrame | None = None
         self._listeners: dict[int, Callable[[LiveFrame], object]] = {}
         self._stretches: dict[int, bool] = {}
         self._wake = threading.Condition()
         self.air = "still"
         self.newest: Frame | None = None
-        self._generation = 0
-        self._thread: threading.Thread | None = None
         self._number = 0
         self._wishes: dict[str, _Wish] = {}
 
@@ -93,41 +155,72 @@ class LiveCamera:
     def open(self, experiment: str, make: Callable[[], Camera], air: str = "still") -> CameraStatus:
         """Open (or open again) the camera that `make` returns; `air` is what a simulated room does.
 
-        Raises DeviceError when it fails.
+        Raises DeviceError when it fails, DeviceBusyError while it is being opened or taking a capture.
         """
-        if self._status.state is CameraState.capturing:
-            raise DeviceBusyError("The camera is taking a capture. Wait for its end, or abort it.")
-        self.close()
+        with self._guard:
+            state = CAMERA.after(self._status.state, CameraEvent.connect)
+            before, mine = self._opened, object()
+            self._opened, self._opener = None, mine
+            self._status = CameraStatus(state, experiment)
+        self._tell_state()
+        self._let_go(before)
         self.air, self.newest = air, None
-        self._change(CameraStatus(CameraState.opening, experiment))
         try:
             camera = make()
             told = self._wish_again(camera, experiment)
+            status = replace(_status_of(camera, CameraState.ready, experiment), reason=told)
         except Exception as error:
-            self._change(CameraStatus(CameraState.failed, experiment, reason=str(error)))
+            self._fail(mine, error)
             raise
-        with self._use:
-            self._camera = camera
-            self._generation += 1
-        self._change(replace(_status_of(camera, CameraState.ready, experiment), reason=told))
-        self._thread = threading.Thread(
-            target=self._run, args=(camera, self._generation), name="live-camera", daemon=True
-        )
-        self._thread.start()
+        opened = _Opened(camera)
+        with self._guard:
+            wanted = self._opener is mine
+            if wanted:
+                state = CAMERA.after(self._status.state, CameraEvent.opened)
+                self._opened = self._opener = opened
+                self._status = replace(status, state=state)
+        if not wanted:
+            self._let_go(opened)
+            raise DeviceBusyError("The camera was disconnected while it was being opened. Connect it again.")
+        self._tell_state()
+        threading.Thread(target=self._run, args=(opened,), name="live-camera", daemon=True).start()
         return self._status
 
     def close(self) -> CameraStatus:
-        """Close the camera; its viewers see no more frames until it is opened again."""
-        with self._use:
-            camera, self._camera = self._camera, None
-            self._generation += 1
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join(timeout=5)
-        if camera is not None:
-            camera.close()
-        if self._status.state is not CameraState.closed:
-            self._change(CameraStatus(CameraState.closed))
+        """Close the camera; its viewers see no more frames until it is opened again.
+
+        Raises DeviceBusyError during a capture.
+        """
+        self._leave(CameraEvent.disconnect, "")
         return self._status
+
+    def give_up(self, reason: str) -> None:
+        """Leave a camera behind that does not answer. Whoever still waits for it can change nothing here."""
+        self._leave(CameraEvent.give_up, reason)
+
+    def _leave(self, event: CameraEvent, reason: str) -> None:
+        with self._guard:
+            before, opened = self._status, self._opened
+            state = CAMERA.after(before.state, event)
+            self._opened, self._opener = None, None
+            experiment = before.experiment if state is CameraState.failed else None
+            self._status = CameraStatus(state, experiment, reason=reason)
+        if before != self._status:
+            self._tell_state()
+        self._let_go(opened, wait_s=5.0 if event is CameraEvent.disconnect else 0.0)
+
+    def _let_go(self, opened: "_Opened | None", wait_s: float = 5.0) -> None:
+        """Close a camera that nobody uses any more; one that hangs is left to whoever waits for it."""
+        if opened is None:
+            return
+        opened.ended = True
+        if opened.use.acquire(timeout=wait_s):
+            try:
+                opened.camera.close()
+            except (DeviceError, OSError) as error:
+                _log.warning("The camera did not close: %s", error)
+            finally:
+                opened.use.release()
 
     def set(self, exposure_s: float | None, gain: float | None) -> CameraStatus:
         """Set what is given and return what the camera granted. Raises DeviceError."""
@@ -144,23 +237,45 @@ class LiveCamera:
     @contextlib.contextmanager
     def using(self, state: CameraState = CameraState.capturing) -> Iterator[Camera]:
         """Hold the camera alone, shown as `state`. Raises DeviceNotFoundError, DeviceBusyError."""
-        if self._status.state is CameraState.capturing:
-            raise DeviceBusyError("The camera is taking a capture. Wait for its end, or abort it.")
-        with self._use:
-            camera, experiment = self._camera, self._status.experiment
-            if camera is None:
+        with self._guard:
+            opened = self._opened
+            if opened is None and self._status.state in (CameraState.closed, CameraState.failed):
                 raise DeviceNotFoundError("No camera is open. Connect the rig of an experiment first.")
-            self._change(_status_of(camera, state, experiment))
-            try:
-                yield camera
-            except DeviceSettingError:
-                raise  # a value that it refuses leaves the camera as it was
-            except DeviceError as error:
-                self._fail(error)
-                raise
-            finally:
-                if self._status.state is not CameraState.failed and self._camera is camera:
-                    self._change(_status_of(camera, CameraState.ready, experiment))
+            taken = CAMERA.after(self._status.state, CameraEvent.take)
+            if state is taken:
+                self._status = replace(self._status, state=taken)
+        assert opened is not None  # noqa: S101 - ready and capturing have one
+        self._tell_state()
+        if not opened.use.acquire(timeout=ANSWER_LIMIT_S):
+            error = DeviceTimeoutError(
+                f"The camera has not answered for {ANSWER_LIMIT_S:g} s. Check its cable, then connect it again."
+            )
+            self._fail(opened, error)
+            raise error
+        try:
+            yield opened.camera
+        except DeviceSettingError:
+            raise  # a value that it refuses leaves the camera as it was
+        except DeviceError as error:
+            self._fail(opened, error)
+            raise
+        finally:
+            opened.use.release()
+            self._give_back(opened)
+
+    def _give_back(self, opened: "_Opened") -> None:
+        """Show the camera as ready, with its settings, unless it was lost or left meanwhile."""
+        with contextlib.suppress(DeviceError, OSError):
+            opened.status = _status_of(opened.camera, CameraState.ready, self._status.experiment)
+        with self._guard:
+            if self._opened is not opened or opened.ended:
+                return
+            if self._status.state is CameraState.capturing:
+                state = CAMERA.after(self._status.state, CameraEvent.give_back)
+                self._status = replace(opened.status or self._status, state=state)
+            elif opened.status:
+                self._status = replace(opened.status, state=self._status.state)
+        self._tell_state()
 
     def show(self, frame: Frame) -> None:
         """Show a frame to whoever looks; captures call it with theirs, so that the picture stays alive."""
@@ -177,8 +292,13 @@ class LiveCamera:
             *frame.pixels.shape,
         )
         self._frame = shown
-        for listener in list(self._listeners.values()):
-            listener(shown)
+        for key, listener in list(self._listeners.items()):
+            try:
+                listener(shown)
+            except Exception:
+                # One who cannot look any more keeps neither the others nor a capture from going on.
+                _log.exception("a watcher of the live picture")
+                self.leave(key)
 
     def watch(self, key: int, listener: Callable[[LiveFrame], object], stretch: bool = False) -> None:
         """Call `listener` with every frame from now on, from another thread, until `leave(key)`."""
@@ -210,20 +330,22 @@ class LiveCamera:
             return f"The settings that were chosen before are not in use. {error}"
         return ""
 
-    def _run(self, camera: Camera, generation: int) -> None:
-        while self._generation == generation:
+    def _run(self, opened: "_Opened") -> None:
+        while not opened.ended:
             with self._wake:
                 if not self._listeners:
                     self._wake.wait(0.2)
                     continue
             started_s = time.monotonic()
             try:
-                frame = self._grab(camera, generation)
-            except DeviceError as error:
-                self._fail(error)
+                frame = self._grab(opened)
+                if frame is not None:
+                    self.show(frame)
+            except Exception as error:
+                if not isinstance(error, DeviceError):
+                    _log.exception("the live picture")
+                self._fail(opened, error)
                 return
-            if frame is not None:
-                self.show(frame)
             time.sleep(max(0.001, 1 / self._rate() - (time.monotonic() - started_s)))
 
     def _rate(self) -> float:
@@ -233,24 +355,34 @@ class LiveCamera:
             self._rate_hz = BUSY_RATE_HZ if self._busy() else LONGEST_RATE_HZ
         return self._rate_hz
 
-    def _grab(self, camera: Camera, generation: int) -> Frame | None:
-        with self._use:
-            if self._generation != generation:
+    def _grab(self, opened: "_Opened") -> Frame | None:
+        with opened.use:
+            if opened.ended:
                 return None
             try:
-                return camera.grab()
+                return opened.camera.grab()
             except FrameError:
                 return None  # The next frame is as good for the eyes.
 
-    def _fail(self, error: DeviceError) -> None:
-        self._generation += 1
-        self._change(CameraStatus(CameraState.failed, self._status.experiment, reason=str(error)))
+    def _fail(self, opener: object, error: Exception) -> None:
+        """Note that a camera failed, unless another one has taken its place."""
+        with self._guard:
+            if self._opener is not opener or not CAMERA.allows(self._status.state, CameraEvent.lose):
+                return
+            if self._opened is not None:
+                self._opened.ended = True
+            state = CAMERA.after(self._status.state, CameraEvent.lose)
+            self._status = CameraStatus(state, self._status.experiment, reason=str(error))
+        self._tell_state()
 
-    def _change(self, status: CameraStatus) -> None:
-        told = status.state is not self._status.state or status.reason != self._status.reason
-        self._status = status
-        if told:
-            self._tell("device", {"device": "camera", "state": status.state.value, "reason": status.reason})
+    def _tell_state(self) -> None:
+        """Tell the state when it is another one than was told last."""
+        with self._guard:
+            news = (self._status.state, self._status.reason)
+            if news == self._told:
+                return
+            self._told = news
+        self._tell("device", {"device": "camera", "state": news[0].value, "reason": news[1]})
 
 
 def _status_of(camera: Camera, state: CameraState, experiment: str | None) -> CameraStatus:

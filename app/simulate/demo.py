@@ -11,6 +11,7 @@ from app.pipeline import reconstruct
 from app.report.page import summary
 from app.simulate.experiment import simulate
 from app.volume.scene import RigOptions
+from core.watch import Watch
 
 _MARK = ".airlens-demo"
 
@@ -42,5 +43,6 @@ def run_demo(
         lambda role, done, total: on_stage(f"{role} capture: frame {done} of {total}"),
     )
     (folder / _MARK).touch()
-    done = reconstruct(folder, "draft", on_stage=on_stage)
+    watch = Watch(lambda row, growing: on_stage(str(row["doing"])))
+    done = reconstruct(folder, "draft", watch=watch)
     return Story(summary(done.finding), done.folder / "report.html")

@@ -6,8 +6,8 @@ Reading order:
 
     what is estimated   balance, plane_openings, prior
     what is measured    observation
-    forward runs        forward_runs
-    the fit             least_squares, parameter_step, heaters, parameter_fit, levenberg_marquardt
+    forward runs        journal, marches, forward_runs, schedule
+    the fit             least_squares, parameter_names, parameter_step, heaters, parameter_fit, levenberg_marquardt
     the last level      discrepancy, temperature_nudging
     other rooms         unstated_heat, alternatives
     the result          uncertainty, posterior, diagnostics

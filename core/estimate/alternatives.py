@@ -3,7 +3,8 @@
 Each alternative costs a whole fit. It is tried only where the fitted room leaves much of the images unexplained.
 """
 
-from core.estimate.forward_runs import Event, RoomSettings, other_closure
+from core.estimate.forward_runs import RoomSettings, other_closure
+from core.estimate.marches import Marches
 from core.estimate.parameter_fit import Background
 from core.estimate.posterior import Analysis, unexplained
 from core.estimate.unstated_heat import with_suspected_heat
@@ -23,7 +24,7 @@ def left_over(analysis: Analysis) -> float:
 
 
 def suspected_heat(
-    analysis: Analysis, background: Background, settings: RoomSettings, report: Event
+    analysis: Analysis, background: Background, settings: RoomSettings, marches: Marches
 ) -> Problem | None:
     """The problem with a heater added that nobody stated; None where no such heater would help.
 
@@ -31,7 +32,7 @@ def suspected_heat(
     """
     if not settings.use_images or not background.prior.unknown_walls() or left_over(analysis) < _TRY_HEAT:
         return None
-    return with_suspected_heat(background, analysis.data, settings, report)
+    return with_suspected_heat(background, analysis.data, settings, marches)
 
 
 def promising_closure(analysis: Analysis, coarse: Room) -> str | None:

@@ -4,24 +4,23 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from core.estimate.marches import Marches, work
 from core.estimate.plane_openings import air_planes, still_vertices
 from core.estimate.prior import WALL_PARAMETERS, Prior
 from core.known import leaving_excess_k
 from core.problem import Problem
+from core.result import Outcome, Solution
 from core.room.boundary_conditions import RoomParameters
 from core.room.forward import Room, room, room_fields
-from core.room.march import March, MarchSettings, march
-from core.room.step import Flow
+from core.room.march import March, MarchSettings, MarchState
+from core.room.step import Flow, RoomModel
 from core.room.vertices import RoomFields
 from core.room.wall_planes import set_normal
 from core.scene import Inlet
 from core.setting import check_range, setting
-
-Event = Callable[[dict[str, float]], object]
 
 # Steps of the finite differences, in prior standard deviations. A march is not quite steady: the step must change the
 # shifts by more than that unsteadiness does, and by less than the response's curvature. With half a deviation the
@@ -109,12 +108,13 @@ def run_as_stated(
     problem: Problem,
     settings: RoomSettings,
     vertices: tuple[int, int, int],
-    report: Event,
+    marches: Marches,
 ) -> ForwardRun:
     """The coarse room under the prior's mean, marched from still air."""
     model = coarse.model(prior.mean)
     flow = coarse.at_rest(model, first_profile_k(problem, coarse))
-    return march_under(coarse, prior.mean, flow, settings.settle_s, vertices, report)
+    doing = "march the coarse room as stated"
+    return march_under(coarse, prior.mean, flow, settings.settle_s, vertices, marches, doing=doing)
 
 
 def first_profile_k(problem: Problem, coarse: Room) -> Float[np.ndarray, " nz"]:
@@ -139,13 +139,15 @@ def march_under(
     flow: Flow,
     seconds: float,
     vertices: tuple[int, int, int],
-    report: Event,
+    marches: Marches,
     *,
+    doing: str | None = None,
     held_k: Float[np.ndarray, " layers"] | None = None,
 ) -> ForwardRun:
     """March `flow` under these parameters; `seconds` are those of the reference room.
 
-    With `held_k` each layer, or the whole room, is held at that mean excess temperature (nudging).
+    With `held_k` each layer, or the whole room, is held at that mean excess temperature (nudging). What the march is
+    for, `doing`, is told with every window; without it nothing is.
     """
     model = where.model(parameters)
     flow = eqx.tree_at(lambda f: f.velocity, flow, set_normal(flow.velocity, model.boundary))
@@ -158,9 +160,26 @@ def march_under(
         level_ahead_s=20.0 * turnover_ratio,
         most_steps=round(_STEPS * float(np.prod(where.grid.cells)) ** (1 / 3) * seconds),
     )
-    held = None if held_k is None else jnp.asarray(held_k, jnp.float32)
-    done = march(flow, model, timing, held_k=held, on_window=report)
+    counted = work(where.grid, seconds)
+
+    def passed(state: MarchState) -> None:
+        if doing is not None:
+            row = {"doing": doing, "model_s": state.model_s, "change": state.change}
+            under_way = counted * min(1.0, state.model_s / timing.longest_s)
+            marches.tell(row, lambda: _growing(where, state, model, vertices), under_way=under_way)
+
+    done = marches.run(flow, model, timing, held_k=held_k, counted=counted, on_window=passed)
+    if doing is not None:
+        marches.record({"doing": doing, "model_s": done.model_s, "change": done.change})
     return ForwardRun(parameters, done, room_fields(done.mean, model, where.layout, vertices))
+
+
+def _growing(where: Room, state: MarchState, model: RoomModel, vertices: tuple[int, int, int]) -> Solution:
+    """The last window's mean as a result."""
+    found, box = room_fields(state.means[-1], model, where.layout, vertices), where.scene.room
+    x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(vertices))
+    kelvin = where.scene.air.ambient_temperature_k + found.excess_k
+    return Solution(x, y, z, kelvin, found.pressure_m2_s2, found.velocity_m_s, outcome=Outcome.step_limit)
 
 
 def perturbed(
@@ -170,19 +189,22 @@ def perturbed(
     base: ForwardRun,
     settings: RoomSettings,
     vertices: tuple[int, int, int],
+    marches: Marches,
 ) -> Derivatives:
     """Restarts of the run `base`: one unchanged, then one for each parameter moved by its step."""
     sizes = differences(prior)
+    flow, seconds = base.flow.last, settings.restart_s
 
     def one(step: Float[np.ndarray, " active"]) -> RoomFields:
-        quiet: Event = lambda _: None  # noqa: E731
-        return march_under(
-            where, prior.parameters(vector + step), base.flow.last, settings.restart_s, vertices, quiet
-        ).fields
+        return march_under(where, prior.parameters(vector + step), flow, seconds, vertices, marches).fields
 
+    found: list[RoomFields] = []
     with ThreadPoolExecutor(settings.threads) as pool:
-        start, *moved = pool.map(one, [np.zeros(len(sizes)), *np.diag(sizes)])
-    return Derivatives(start, moved, sizes)
+        for run in pool.map(one, [np.zeros(len(sizes)), *np.diag(sizes)]):
+            found.append(run)
+            doing = "move one parameter after the other"
+            marches.record({"doing": doing, "moved": len(found) - 1.0, "of": float(len(sizes))})
+    return Derivatives(found[0], found[1:], sizes)
 
 
 def differences(prior: Prior) -> Float[np.ndarray, " active"]:
@@ -203,9 +225,11 @@ def run_under_other_closure(
     base: ForwardRun,
     settings: RoomSettings,
     vertices: tuple[int, int, int],
+    marches: Marches,
 ) -> RoomFields:
     """A restart of the run `base` under another closure: the difference is an error of turbulence modelling."""
     last = base.flow.last
     flow = Flow(last.velocity, last.excess_k, last.pressure_m2_s2, None)
     another = room(where.scene, settings.coarse_cells, other_closure(where))
-    return march_under(another, parameters, flow, settings.restart_s, vertices, lambda _: None).fields
+    doing = f"march the coarse room by the closure {another.closure}"
+    return march_under(another, parameters, flow, settings.restart_s, vertices, marches, doing=doing).fields

@@ -8,14 +8,18 @@ with more, heater by heater, as long as the misfit with the data falls.
 import numpy as np
 from jaxtyping import Float
 
-from core.estimate.forward_runs import Event, ForwardRun, RoomSettings, march_under
+from core.estimate.forward_runs import ForwardRun, RoomSettings, march_under
+from core.estimate.marches import Marches
 from core.estimate.observation import Observations
+from core.estimate.parameter_names import by_name
 from core.estimate.parameter_step import Vector, misfit_ratio
 from core.estimate.prior import Prior
 from core.room.forward import Room
 
 # Most steps of one prior deviation (0.6 in the logarithm) up or down.
 _MOST_STEPS = 2
+
+_DOING = "march with heaters that give less, or more"
 
 
 def heaters_by_march(
@@ -25,7 +29,7 @@ def heaters_by_march(
     base: ForwardRun,
     offset: Float[np.ndarray, " data"],
     settings: RoomSettings,
-    report: Event,
+    marches: Marches,
 ) -> tuple[Vector, ForwardRun]:
     """The heaters' coefficients in prior deviations, all other parameters zero, and the coarse room under them."""
 
@@ -34,9 +38,10 @@ def heaters_by_march(
             moved = vector.copy()
             moved[n] += way
             where, flow = prior.parameters(moved), base.flow.last
-            tried = march_under(coarse, where, flow, settings.restart_s, data.vertices, lambda _: None)
+            seconds = settings.restart_s
+            tried = march_under(coarse, where, flow, seconds, data.vertices, marches, doing=_DOING)
             left = misfit_ratio(data, tried, base, offset)
-            report({prior.names()[n]: float(moved[n]), "misfit_left": left})
+            marches.record({"doing": _DOING, "misfit_left": left, **by_name(prior, moved)})
             if left >= 1.0:
                 break
             vector, base = moved, tried

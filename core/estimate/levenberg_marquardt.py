@@ -10,13 +10,17 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from core.estimate.forward_runs import Derivatives, Event, ForwardRun, RoomSettings, march_under
+from core.estimate.forward_runs import Derivatives, ForwardRun, RoomSettings, march_under
 from core.estimate.least_squares import LONGEST_STEP, Posterior
+from core.estimate.marches import Marches
 from core.estimate.observation import Observations
 from core.estimate.parameter_fit import GAIN, PATIENCE, Fit
-from core.estimate.parameter_step import Jacobian, Vector, by_name, corrected, farthest, misfit_ratio, secant
+from core.estimate.parameter_names import by_name
+from core.estimate.parameter_step import Jacobian, Vector, corrected, farthest, misfit_ratio, secant
 from core.estimate.prior import Prior
 from core.room.forward import Room
+
+_DOING = "search the fine room's parameters"
 
 
 def fine_search(
@@ -27,7 +31,7 @@ def fine_search(
     derivatives: Derivatives,
     renewed: Callable[[Vector], Derivatives],
     settings: RoomSettings,
-    report: Event,
+    marches: Marches,
 ) -> tuple[Fit, Derivatives]:
     """The parameters and forward run of least misfit, and the last derivatives.
 
@@ -40,9 +44,10 @@ def fine_search(
     stale, renewals, trust_radius = 0, settings.renewals, LONGEST_STEP
     jacobian = derivatives.per_deviation(data.predicted).T
     for n in range(settings.rounds):
-        new = searched(fine, prior, data, best, jacobian, grid_difference, trust_radius, settings, report)
+        new = searched(fine, prior, data, best, jacobian, grid_difference, trust_radius, settings, marches)
         left = misfit_ratio(data, new.room, best.room)
-        report({"round": n + 1.0, "misfit_left": left, **by_name(prior, new.posterior.vector)})
+        values = by_name(prior, new.posterior.vector)
+        marches.record({"doing": _DOING, "round": n + 1.0, "misfit_left": left, **values})
         change = data.predicted(new.room.fields) - data.predicted(best.room.fields)
         jacobian = secant(jacobian, new.posterior.vector - best.posterior.vector, change)
         step = farthest(new.posterior.vector, best.posterior.vector)
@@ -69,7 +74,7 @@ def searched(
     grid_difference: Float[np.ndarray, " data"],
     trust_radius: float,
     settings: RoomSettings,
-    report: Event,
+    marches: Marches,
 ) -> Fit:
     """One damped step from the best room, and the forward run under the new parameters."""
     where, gaussian = best.posterior.vector, prior.gaussian()
@@ -77,4 +82,5 @@ def searched(
         where, best.room, data, jacobian, grid_difference, gaussian=gaussian, trust_radius=trust_radius
     )
     parameters, flow = prior.parameters(asked.vector), best.room.flow.last
-    return Fit(asked, march_under(fine, parameters, flow, settings.refine_s, data.vertices, report))
+    seconds, seen_on = settings.refine_s, data.vertices
+    return Fit(asked, march_under(fine, parameters, flow, seconds, seen_on, marches, doing=_DOING))

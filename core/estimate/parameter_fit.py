@@ -8,11 +8,13 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 
-from core.estimate.forward_runs import Derivatives, Event, ForwardRun, RoomSettings, march_under, perturbed
+from core.estimate.forward_runs import Derivatives, ForwardRun, RoomSettings, march_under, perturbed
 from core.estimate.heaters import heaters_by_march
 from core.estimate.least_squares import Posterior
+from core.estimate.marches import Marches
 from core.estimate.observation import Observations
-from core.estimate.parameter_step import Vector, by_name, corrected, farthest, misfit_ratio
+from core.estimate.parameter_names import by_name
+from core.estimate.parameter_step import Vector, corrected, farthest, misfit_ratio
 from core.estimate.prior import Prior
 from core.estimate.temperature_nudging import to_hold_k
 from core.problem import Problem
@@ -38,7 +40,7 @@ class Background(eqx.Module):
 
 
 def coarse_fit(
-    background: Background, data: Observations, settings: RoomSettings, report: Event
+    background: Background, data: Observations, settings: RoomSettings, marches: Marches
 ) -> tuple[Vector, ForwardRun, Derivatives]:
     """Parameters fitted on the coarse grid, the forward run under them, and its derivatives.
 
@@ -56,9 +58,12 @@ def coarse_fit(
     finer = data.predicted(background.first.fields) - data.predicted(base.fields)
     moves = settings.use_images and not prior.unknown_walls()
     if moves:
-        vector, base = heaters_by_march(coarse, prior, data, base, finer, settings, report)
+        vector, base = heaters_by_march(coarse, prior, data, base, finer, settings, marches)
     if np.any(vector):
-        derivatives, linearised = perturbed(coarse, prior, vector, base, settings, data.vertices), vector
+        derivatives, linearised = (
+            perturbed(coarse, prior, vector, base, settings, data.vertices, marches),
+            vector,
+        )
     for n in range(settings.coarse_rounds if moves else 0):
         # The grids' difference changes as the parameters move: half of it counts as representation error.
         jacobian = derivatives.per_deviation(data.predicted).T
@@ -75,16 +80,20 @@ def coarse_fit(
         if farthest(new, vector) < settings.coarse_step:
             break
         where, seconds = prior.parameters(new), settings.restart_s
-        tried = march_under(coarse, where, base.flow.last, seconds, data.vertices, report)
+        flow, doing = base.flow.last, "correct the coarse room"
+        tried = march_under(coarse, where, flow, seconds, data.vertices, marches, doing=doing)
         left = misfit_ratio(data, tried, base, finer)
-        report({"coarse_round": n + 1.0, "misfit_left": left, **by_name(prior, new)})
+        marches.record({"doing": doing, "coarse_round": n + 1.0, "misfit_left": left, **by_name(prior, new)})
         if left > settings.least_gain:
             break
         vector, base = new, tried
         if farthest(vector, linearised) > settings.jacobian_valid:
-            derivatives, linearised = perturbed(coarse, prior, vector, base, settings, data.vertices), vector
+            derivatives, linearised = (
+                perturbed(coarse, prior, vector, base, settings, data.vertices, marches),
+                vector,
+            )
     if np.any(vector != linearised):
-        derivatives = perturbed(coarse, prior, vector, base, settings, data.vertices)
+        derivatives = perturbed(coarse, prior, vector, base, settings, data.vertices, marches)
     return vector, base, derivatives
 
 
@@ -108,7 +117,7 @@ def fine_fit(
     first: ForwardRun,
     derivatives: Derivatives,
     settings: RoomSettings,
-    report: Event,
+    marches: Marches,
 ) -> Fit:
     """Gauss-Newton rounds on the fine grid; without images the room as stated.
 
@@ -119,7 +128,7 @@ def fine_fit(
     stale = 0
     for n in range(settings.rounds if settings.use_images else 0):
         new, left = fine_round(
-            n, fine, prior, data, best, least, derivatives, grid_difference, settings, report
+            n, fine, prior, data, best, least, derivatives, grid_difference, settings, marches
         )
         if left > _REJECTED:
             best = best.with_posterior_of(new)
@@ -144,7 +153,7 @@ def fine_round(
     derivatives: Derivatives,
     grid_difference: Float[np.ndarray, " data"],
     settings: RoomSettings,
-    report: Event,
+    marches: Marches,
 ) -> tuple[Fit, float]:
     """One step and the forward run under it, and its misfit over the least one; half the step if all is rejected.
 
@@ -158,12 +167,14 @@ def fine_round(
     for share in (1.0, 0.5):
         vector = best.posterior.vector + share * (asked.vector - best.posterior.vector)
         flow = best.room.flow.last
-        tried = march_under(fine, prior.parameters(vector), flow, settings.refine_s, data.vertices, report)
+        where, doing = prior.parameters(vector), "correct the fine room"
+        tried = march_under(fine, where, flow, settings.refine_s, data.vertices, marches, doing=doing)
         new, left = (
             Fit(Posterior(vector, asked.covariance, asked.deviation), tried),
             misfit_ratio(data, tried, least.room),
         )
-        report({"round": n + 2.0 - share, "misfit_left": left, **by_name(prior, vector)})
+        values = by_name(prior, vector)
+        marches.record({"doing": doing, "round": n + 2.0 - share, "misfit_left": left, **values})
         if left <= _REJECTED:
             break
     return new, left
@@ -176,18 +187,25 @@ def held_fit(
     before: ForwardRun,
     derivatives: Derivatives,
     settings: RoomSettings,
-    report: Event,
+    marches: Marches,
 ) -> ForwardRun:
     """The room `before`, marched on while held at the measured mean temperatures; the longest march is the last.
 
     A wrong level, or profile, of T gives jets the wrong buoyancy. If the held room fits worse, `before` is returned.
     """
-    held, left = before, 1.0
+    held, left, doing = before, 1.0, "hold the temperatures that measurements say"
     for seconds in (settings.refine_s, settings.final_s):
         held_k = to_hold_k(data, prior, derivatives, held, before, fine.layout)
         held = march_under(
-            fine, before.parameters, held.flow.last, seconds, data.vertices, report, held_k=held_k
+            fine,
+            before.parameters,
+            held.flow.last,
+            seconds,
+            data.vertices,
+            marches,
+            doing=doing,
+            held_k=held_k,
         )
         left = misfit_ratio(data, held, before)
-        report({"held_s": seconds, "misfit_left": left})
+        marches.record({"doing": doing, "held_s": seconds, "misfit_left": left})
     return before if left > _ACCEPTED else held

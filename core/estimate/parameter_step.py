@@ -6,7 +6,6 @@ from jaxtyping import Bool, Float
 from core.estimate.forward_runs import ForwardRun
 from core.estimate.least_squares import Posterior, gauss_newton, weighted_variance
 from core.estimate.observation import Observations
-from core.estimate.prior import Prior
 
 Vector = Float[np.ndarray, " active"]
 Jacobian = Float[np.ndarray, "data active"]
@@ -49,11 +48,6 @@ def misfit_ratio(
 def farthest(one: Vector, other: Vector) -> float:
     """The largest difference of two sets of parameters, in prior deviations."""
     return float(np.abs(one - other).max(initial=0.0))
-
-
-def by_name(prior: Prior, vector: Vector) -> dict[str, float]:
-    """Parameters by name, in deviations from their priors."""
-    return dict(zip(prior.names(), (float(v) for v in vector), strict=True))
 
 
 def secant(jacobian: Jacobian, moved: Vector, change: Float[np.ndarray, " data"]) -> Jacobian:

@@ -16,7 +16,8 @@ from typing import NamedTuple
 import equinox as eqx
 import numpy as np
 
-from core.estimate.forward_runs import Event, RoomSettings, march_under
+from core.estimate.forward_runs import RoomSettings, march_under
+from core.estimate.marches import Marches
 from core.estimate.observation import Observations
 from core.estimate.parameter_fit import Background
 from core.estimate.parameter_step import misfit_ratio
@@ -37,21 +38,25 @@ _STD_SHARE = 0.5
 # A strip enters a fit if the room with it has less than this share of the misfit of the room without.
 _WORTHWHILE = 0.8
 
+_DOING = "look for heat that nobody stated"
+
 
 def with_suspected_heat(
-    background: Background, data: Observations, settings: RoomSettings, report: Event
+    background: Background, data: Observations, settings: RoomSettings, marches: Marches
 ) -> Problem | None:
     """The problem with the best strip and its neighbours as heaters; None if no strip helps enough."""
     strips = floor_strips(background.problem)
-    climbs = climbed_each(strips, background, data, settings)
+    climbs = climbed_each(strips, background, data, settings, marches)
     if min((climb.left for climb in climbs), default=1.0) > _WORTHWHILE:
         return None
     best = min(climbs, key=lambda climb: climb.left)
     # A panel may lie half on one strip and half on the next.
     between = floor_strips(background.problem, between=True)
     halves = [strip for strip in between if share_area(strip.patch, best.strip.patch)]
-    best = min((best, *climbed_each(halves, background, data, settings)), key=lambda climb: climb.left)
-    report({"suspected_k": best.heat_k, "misfit_left": best.left})
+    best = min(
+        (best, *climbed_each(halves, background, data, settings, marches)), key=lambda climb: climb.left
+    )
+    marches.record({"doing": _DOING, "suspected_k": best.heat_k, "misfit_left": best.left})
     warm = replace(best.strip, temperature_k=best.strip.temperature_k + best.heat_k)
     beside = [strip for strip in (*strips, *between) if adjoin(strip, warm)]
     return with_heaters(
@@ -68,7 +73,11 @@ class Climb(NamedTuple):
 
 
 def climbed_each(
-    strips: Sequence[SuspectedHeater], background: Background, data: Observations, settings: RoomSettings
+    strips: Sequence[SuspectedHeater],
+    background: Background,
+    data: Observations,
+    settings: RoomSettings,
+    marches: Marches,
 ) -> list[Climb]:
     """The best heat of each strip, each tried by itself."""
     cold = with_heaters(background.problem, strips)
@@ -77,7 +86,7 @@ def climbed_each(
     before = len(mean.heater_excess_k) - len(strips)
 
     def climb(n: int) -> Climb:
-        return Climb(*climbed(before + n, coarse, mean, background, data, settings), strips[n])
+        return Climb(*climbed(before + n, coarse, mean, background, data, settings, marches), strips[n])
 
     with ThreadPoolExecutor(settings.threads) as pool:
         return list(pool.map(climb, range(len(strips))))
@@ -90,12 +99,13 @@ def climbed(
     background: Background,
     data: Observations,
     settings: RoomSettings,
+    marches: Marches,
 ) -> tuple[float, float]:
     """Least misfit with this heater, over that of the room without it, and its temperature above the air."""
     least, best_k, flow = np.inf, 0.0, background.base.flow.last
     for heat_k in _LADDER_K:
         warm = eqx.tree_at(lambda p: p.heater_excess_k, mean, mean.heater_excess_k.at[heater].add(heat_k))
-        tried = march_under(coarse, warm, flow, settings.restart_s, data.vertices, lambda _: None)
+        tried = march_under(coarse, warm, flow, settings.restart_s, data.vertices, marches)
         left = misfit_ratio(data, tried, background.base)
         if left > least:
             break

@@ -13,6 +13,7 @@ import numpy as np
 
 from core.estimate.forward_runs import RoomSettings
 from core.estimate.prior import room_prior
+from core.estimate.schedule import fit_work
 from core.plan.expected import ExpectedFlow
 from core.problem import Problem
 from core.room.forward import closure_name, room
@@ -22,8 +23,6 @@ from core.solve.recipes import PAPER_STEPS
 
 # Iterations of `draft` without a plane over those with one: 55 over 35, median of six rooms.
 _FREE_PROFILE = 1.5
-# Usual number of rounds of the fit on the fine grid, with stated and with unknown walls.
-_STATED_ROUNDS, _UNKNOWN_ROUNDS = 3, 6
 
 
 @dataclass(frozen=True)
@@ -67,20 +66,8 @@ def room_work(problem: Problem, flow: ExpectedFlow, settings: RoomSettings) -> W
     coarse = room(scene, settings.coarse_cells, closure_name(scene))
     fine = room(scene, settings.cells, closure_name(scene))
     prior = room_prior(problem, coarse.layout)
-    restarts = (1 + len(prior.active())) * settings.restart_s
-    # Unknown walls move far: Jacobians are computed anew, and the fit takes more rounds.
-    far = bool(prior.unknown_walls())
-    rounds = min(settings.rounds, _UNKNOWN_ROUNDS if far else _STATED_ROUNDS)
-    # Beside the Jacobian: one round on the coarse grid, and the run under another closure.
-    coarse_s = settings.settle_s + (1 + settings.renewals * far) * restarts + 2 * settings.restart_s
-    # The room as stated, each round, and two marches that hold the level of T.
-    fine_s = (2 + rounds) * settings.refine_s + settings.final_s
     steps = flow.turnover_ratio / flow.step_s * flow.cell_m
-    loops = 0.0
-    for place, seconds in ((coarse, coarse_s), (fine, fine_s)):
-        cells = float(np.prod(place.grid.cells))
-        loops += cells * seconds * steps / min(place.grid.spacing_m)
-    return Work(loops, float(np.prod(fine.grid.cells)))
+    return Work(steps * fit_work(coarse, fine, prior, settings), float(np.prod(fine.grid.cells)))
 
 
 def grid_work(problem: Problem) -> Work:

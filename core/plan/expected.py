@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from core.air import Air
 from core.estimate.forward_runs import RoomSettings, run_as_stated
+from core.estimate.marches import Marches
 from core.estimate.plane_openings import with_plane_openings
 from core.estimate.prior import room_prior
 from core.fields import SplineField, plume, through_vertices
@@ -104,7 +105,7 @@ def _marched(problem: Problem) -> ExpectedFlow:
     coarse = room(scene, _COARSE.coarse_cells, closure_name(scene))
     shape = (_VERTICES, _VERTICES, _VERTICES)
     prior = room_prior(problem, coarse.layout)
-    done = run_as_stated(coarse, prior, problem, _COARSE, shape, lambda _: None)
+    done = run_as_stated(coarse, prior, problem, _COARSE, shape, Marches())
     excess = _without_layers(np.asarray(done.fields.excess_k, np.float64))
     # A short coarse march may overshoot: the air is no warmer, and no colder, than what drives it.
     stated = [0.0, *_stated_excesses_k(problem)]

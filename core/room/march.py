@@ -5,10 +5,12 @@ The march ends when the mean velocity of a window differs from that of the windo
 flows on coarse grids oscillate slowly. The mean temperature of the room, or of every layer, can be held: the air is
 shifted to it after each window. If a value becomes infinite, the march returns to the last window and halves the
 Courant number, once.
+
+Between two chunks of steps a march can be stopped; it goes on from its last window (`MarchState`).
 """
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -71,61 +73,92 @@ class March(eqx.Module):
     change: float = eqx.field(static=True)
 
 
+class MarchState(eqx.Module):
+    """A march between two windows: all that the next one depends on, and what is kept of those before.
+
+    `means` are of the last third of the windows so far, `held_k_s` what it took to hold temperatures over them.
+    """
+
+    flow: Flow
+    means: tuple[Flow, ...] = ()
+    held_k_s: tuple[float, ...] = ()
+    courant: float = 0.0
+    model_s: float = 0.0
+    steps: int = 0
+    windows: int = 0
+    change: float = float("inf")
+
+
 def march(
     flow: Flow,
     model: RoomModel,
     settings: MarchSettings,
     *,
     held_k: Float[Array, " layers"] | None = None,
-    on_window: Callable[[dict[str, Any]], object] | None = None,
+    begun: MarchState | None = None,
+    on_window: Callable[[MarchState], object] = lambda state: None,
+    check_stop: Callable[[], object] = lambda: None,
 ) -> March:
-    """March `flow` to its steady state; `held_k` holds the mean excess temperature of each layer, or of the room."""
-    windows: list[Flow] = []
-    held: list[float] = []
-    seconds = settings.window_s
-    courant, model_s, steps, marched, change = settings.courant, 0.0, 0, 0, float("inf")
-    outcome = Outcome.step_limit
-    while model_s < settings.longest_s - 1e-6 and steps < settings.most_steps:
-        start = flow
-        mean, new, taken = _window(start, model, settings, courant)
-        if not bool(_finite(new)):
-            if courant < settings.courant:
-                outcome = Outcome.nonfinite
-                break
-            courant *= 0.5
-            continue
-        model_s, steps = model_s + seconds, steps + taken
-        change = float(_relative_change(mean, windows[-1])) if windows else float("inf")
-        marched += 1
-        # Only the last third is needed, whenever the march ends.
-        windows = [*windows, mean][-_third(marched) :]
-        if on_window is not None:
-            # The middle of the room as it is now, for somebody to watch it grow.
-            plane = np.asarray(mean.excess_k[:, mean.excess_k.shape[1] // 2], np.float32)
-            on_window({"model_s": model_s, "change": change, "excess_plane_k": plane})
-        flow = new
-        if change < settings.tolerance and model_s > settings.least_s - 1e-6:
-            outcome = Outcome.converged
+    """March `flow` to its steady state; `held_k` holds the mean excess temperature of each layer, or of the room.
+
+    A march that was `begun` goes on to the same bits. `check_stop` is called between two chunks, and may raise.
+    """
+    state = begun or MarchState(flow, courant=settings.courant)
+    outcome = None
+    while outcome is None:
+        if state.model_s >= settings.longest_s - 1e-6 or state.steps >= settings.most_steps:
+            outcome = Outcome.step_limit
             break
-        if held_k is not None:
-            found_k = mean.excess_k.mean((0, 1))
-            shift_k = held_k - (found_k if held_k.size > 1 else found_k.mean())
-            held = [*held, float(shift_k.mean()) / seconds][-_third(marched) :]
-            flow = _shifted(new, shift_k)
-        elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
-            flow = _levelled(new, (new.excess_k - start.excess_k) / seconds, model, settings.level_ahead_s)
-    mean = _mean(windows) if windows else flow
-    return March(flow, mean, float(np.mean(held)) if held else None, outcome, model_s, steps, change)
+        state, outcome = _after_window(state, model, settings, held_k, check_stop)
+        on_window(state)
+    mean = _mean(list(state.means)) if state.means else state.flow
+    held = float(np.mean(state.held_k_s)) if state.held_k_s else None
+    return March(state.flow, mean, held, outcome, state.model_s, state.steps, state.change)
+
+
+def _after_window(
+    state: MarchState,
+    model: RoomModel,
+    settings: MarchSettings,
+    held_k: Float[Array, " layers"] | None,
+    check_stop: Callable[[], object],
+) -> tuple[MarchState, Outcome | None]:
+    """The state a window later, and how the march ended if it did so."""
+    start, seconds = state.flow, settings.window_s
+    mean, flow, taken = _window(start, model, settings, state.courant, check_stop)
+    if not bool(_finite(flow)):
+        if state.courant < settings.courant:
+            return state, Outcome.nonfinite
+        return replace(state, courant=0.5 * state.courant), None
+    model_s, windows, held = state.model_s + seconds, state.windows + 1, state.held_k_s
+    change = float(_relative_change(mean, state.means[-1])) if state.means else float("inf")
+    outcome = None
+    if change < settings.tolerance and model_s > settings.least_s - 1e-6:
+        outcome = Outcome.converged
+    elif held_k is not None:
+        found_k = mean.excess_k.mean((0, 1))
+        shift_k = held_k - (found_k if held_k.size > 1 else found_k.mean())
+        held = (*held, float(shift_k.mean()) / seconds)[-_third(windows) :]
+        flow = _shifted(flow, shift_k)
+    elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
+        flow = _levelled(flow, (flow.excess_k - start.excess_k) / seconds, model, settings.level_ahead_s)
+    # Only the last third is needed, whenever the march ends.
+    means = (*state.means, mean)[-_third(windows) :]
+    steps = state.steps + taken
+    return MarchState(flow, means, held, state.courant, model_s, steps, windows, change), outcome
 
 
 def _third(windows: int) -> int:
     return max(1, round(windows / 3))
 
 
-def _window(flow: Flow, model: RoomModel, settings: MarchSettings, courant: float) -> tuple[Flow, Flow, int]:
+def _window(
+    flow: Flow, model: RoomModel, settings: MarchSettings, courant: float, check_stop: Callable[[], object]
+) -> tuple[Flow, Flow, int]:
     """Mean over one window, the state at its end, and the steps taken."""
     left_s, means, weights = settings.window_s, [], []
     while left_s > 1e-9:
+        check_stop()
         stable_s = float(_longest_step_s(flow, model, courant))
         if not stable_s > 1e-9:
             break

@@ -1,4 +1,4 @@
-"""The loop of a gradient method: one compiled step, events, checkpoints, and a named end.
+"""The loop of a gradient method: one compiled step, rows, checkpoints, and a named end.
 
 The step is compiled once, before the loop, for this state and data: it cannot recompile, and its memory
 is known before it runs. Mini-batches are a function of (seed, step), so a resumed run repeats bitwise on
@@ -17,11 +17,11 @@ import numpy as np
 import optax
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray, PyTree
 
-from core.result import Outcome
+from core.checkpoint import claim, encode, keep, newest, restore
+from core.result import Outcome, Solution
 from core.setting import SettingError, setting
-from core.solve.checkpoint import CheckpointStore, encode, newest, restore
+from core.watch import Growing, Row, StoppedError, Store, Watch
 
-OnEvent = Callable[[dict[str, Any]], object]
 Objective = Callable[[PyTree, PyTree, PRNGKeyArray], tuple[Float[Array, ""], dict[str, Float[Array, ""]]]]
 
 _SMOOTHING = 0.98
@@ -71,7 +71,7 @@ class LoopResult:
     best: PyTree
     last: PyTree
     outcome: Outcome
-    history: tuple[dict[str, float], ...]
+    history: tuple[Row, ...]
     compile_s: float
     run_s: float
     memory_bytes: int
@@ -85,29 +85,29 @@ def run(
     settings: LoopSettings,
     *,
     configuration: str,
-    on_event: OnEvent | None = None,
-    store: CheckpointStore | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    watch: Callable[[PyTree, float], object] | None = None,
+    watch: Watch = Watch(),
+    growing: Callable[[PyTree, float], Solution] | None = None,
 ) -> LoopResult:
     """Minimise `objective(unknowns, data, key)` over the inexact arrays of `unknowns`.
 
-    `watch(unknowns, elapsed_s)` is called at every record; its own time is the caller's to leave out.
+    `growing(unknowns, elapsed_s)` is the air as it is then, for whoever watches.
 
-    Raises SettingError if the step needs more memory than `memory_limit_bytes`, or if a checkpoint does
-    not belong to this configuration.
+    Raises SettingError if the step needs more memory than `memory_limit_bytes`, ForeignCheckpointError if the
+    store does not belong to this configuration, StoppedError where a stop was asked for, its state kept.
     """
-    tell = on_event or (lambda event: None)
+    store = watch.store
     state = _initial(unknowns, optimiser)
-    history: list[dict[str, float]] = []
-    found = newest(store) if store else None
+    history: list[Row] = []
+    if store is not None:
+        claim(store, configuration)
+    found = newest(store) if store is not None else None
     if found is not None:
         state = restore(found, state, configuration=configuration)
         history = list(found.header["history"])
     began = time.perf_counter()
     step = _compile(objective, optimiser, settings, state, data)
     compile_s, memory = time.perf_counter() - began, _memory_bytes(step)
-    tell({"kind": "start", "step": int(state.step), "memory_bytes": memory, "compile_s": compile_s})
+    watch.tell({"doing": "compiled", "compile_s": compile_s, "memory_bytes": float(memory)})
     if settings.memory_limit_bytes is not None and memory > settings.memory_limit_bytes:
         raise SettingError(
             f"A step needs {memory / 1e9:.2f} GB, and "
@@ -120,25 +120,23 @@ def run(
     while outcome is None:
         started = time.perf_counter()
         following, parts = step(state, data)
-        if slow and should_stop is not None and not _arrived(following.step, should_stop):
+        if slow and not _arrived(following.step, watch.should_stop):
             # What this step began is given up: the state before it is kept within a second.
-            outcome = Outcome.stopped
             keeper.save_if_due(state, history, final=True)
-            tell({"kind": "checkpoint", "step": int(state.step)})
-            break
+            raise StoppedError
         state, number = following, int(following.step)
         slow = time.perf_counter() - started > _LONGEST_WAIT_S
         due = number % settings.record_every == 0 or number == settings.steps
         if due or not bool(state.finite):
-            history.append(_record(state, parts, time.perf_counter() - began))
-            tell({"kind": "progress", "steps": settings.steps, **history[-1]})
-            if watch is not None:
-                watch(state.unknowns, history[-1]["elapsed_s"])
-        outcome = _ended(state, settings, began, should_stop)
-        if keeper.save_if_due(state, history, final=outcome is Outcome.stopped):
-            tell({"kind": "checkpoint", "step": number})
+            elapsed_s = time.perf_counter() - began
+            history.append(_record(state, parts, elapsed_s, settings))
+            watch.tell(history[-1], _grown(growing, state.unknowns, elapsed_s))
+        outcome = _ended(state, settings, began)
+        stopped = outcome is None and watch.should_stop()
+        keeper.save_if_due(state, history, final=stopped)
+        if stopped:
+            raise StoppedError
     run_s = time.perf_counter() - began
-    tell({"kind": "end", "step": int(state.step), "outcome": outcome.name, "advice": outcome.value})
     return LoopResult(state.best, state.unknowns, outcome, tuple(history), compile_s, run_s, memory)
 
 
@@ -211,9 +209,13 @@ def _choose(condition: Bool[Array, ""], yes: PyTree, no: PyTree) -> PyTree:
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b) if eqx.is_array(a) else a, yes, no)
 
 
-def _ended(
-    state: LoopState, settings: LoopSettings, began: float, should_stop: Callable[[], bool] | None
-) -> Outcome | None:
+def _grown(
+    growing: Callable[[PyTree, float], Solution] | None, unknowns: PyTree, elapsed_s: float
+) -> Growing | None:
+    return None if growing is None else lambda: growing(unknowns, elapsed_s)
+
+
+def _ended(state: LoopState, settings: LoopSettings, began: float) -> Outcome | None:
     number = int(state.step)
     if not bool(state.finite):
         return Outcome.nonfinite
@@ -223,14 +225,16 @@ def _ended(
         return Outcome.plateau
     if settings.time_limit_s is not None and time.perf_counter() - began > settings.time_limit_s:
         return Outcome.time_limit
-    if should_stop is not None and should_stop():
-        return Outcome.stopped
     return None
 
 
-def _record(state: LoopState, parts: dict[str, Float[Array, ""]], elapsed_s: float) -> dict[str, float]:
+def _record(
+    state: LoopState, parts: dict[str, Float[Array, ""]], elapsed_s: float, settings: LoopSettings
+) -> Row:
     numbers = {name: float(value) for name, value in parts.items()}
-    return {"step": float(state.step), "elapsed_s": elapsed_s, **numbers}
+    step = float(state.step)
+    share = step / settings.steps
+    return {"doing": "optimise", "step": step, "share": share, "elapsed_s": elapsed_s, **numbers}
 
 
 def _memory_bytes(step: Any) -> int:
@@ -244,26 +248,25 @@ def _memory_bytes(step: Any) -> int:
 class _Keeper:
     """Saves at most every min(checkpoint_every_s, 1 % of the run), at a cost of at most 1 %."""
 
-    def __init__(self, store: CheckpointStore | None, settings: LoopSettings, configuration: str) -> None:
+    def __init__(self, store: Store | None, settings: LoopSettings, configuration: str) -> None:
         self._store, self._settings, self._configuration = store, settings, configuration
         self._began = self._last = time.perf_counter()
         self._cost_s = 0.0
         self._first: int | None = None
 
-    def save_if_due(self, state: LoopState, history: list[dict[str, float]], *, final: bool) -> bool:
-        """Whether a checkpoint was written."""
+    def save_if_due(self, state: LoopState, history: list[Row], *, final: bool) -> None:
+        """Write a checkpoint if it is time or the last chance."""
         number = int(state.step)
         self._first = number if self._first is None else self._first
         if self._store is None or not (final or self._due(number)):
-            return False
+            return
         began = time.perf_counter()
         content = encode(
             state, configuration=self._configuration, step=number, seed=self._settings.seed, history=history
         )
-        self._store.save(content)
+        keep(self._store, content)
         self._last = time.perf_counter()
         self._cost_s = self._last - began
-        return True
 
     def _due(self, number: int) -> bool:
         every = self._settings.checkpoint_every_steps

@@ -5,15 +5,15 @@ was stated. Standard deviations come from the parameters' posterior and from the
 closures. core/estimate/README.md has the method.
 """
 
-import time
+from dataclasses import replace
 
 import numpy as np
 
+from core.checkpoint import digest
 from core.estimate.alternatives import KEEP_HEAT, left_over, promising_closure, suspected_heat
 from core.estimate.diagnostics import another_closure
 from core.estimate.forward_runs import (
     Derivatives,
-    Event,
     ForwardRun,
     RoomSettings,
     march_under,
@@ -22,33 +22,38 @@ from core.estimate.forward_runs import (
     run_under_other_closure,
 )
 from core.estimate.levenberg_marquardt import fine_search
+from core.estimate.marches import Marches
 from core.estimate.observation import Observations, observations
 from core.estimate.parameter_fit import Background, coarse_fit, fine_fit, held_fit
 from core.estimate.parameter_step import Vector
 from core.estimate.plane_openings import with_plane_openings
 from core.estimate.posterior import Analysis, solution
 from core.estimate.prior import room_prior
+from core.estimate.schedule import fit_work
 from core.problem import Problem
 from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
 from core.room.forward import carried_over, closure_name, room
+from core.watch import Watch
 
 
-def solve_room(
-    problem: Problem, settings: RoomSettings = RoomSettings(), *, on_event: Event | None = None
-) -> Solution:
+def solve_room(problem: Problem, settings: RoomSettings = RoomSettings(), watch: Watch = Watch()) -> Solution:
     """T, p and u of the room, with standard deviations and sentences for the operator.
+
+    A solve that `watch.store` knows of takes its marches from there, goes on with those that were cut, and ends
+    bitwise as it would have on a CPU. A stop is heard between two chunks of time steps.
 
     Raises:
         SettingError: a boundary that cannot be (see `core.room.boundary_conditions`).
+        ForeignCheckpointError: the store belongs to another problem or to other settings.
+        StoppedError: a stop was asked for.
     """
-    start_s = time.perf_counter()
-    report: Event = on_event or (lambda _: None)
-    return analyse(background_of(problem, settings, report), problem, settings, report, start_s=start_s)
+    marches = Marches(watch, digest(problem, replace(settings, threads=1)))
+    return analyse(background_of(problem, settings, marches), problem, settings, marches)
 
 
 def background_of(
-    problem: Problem, settings: RoomSettings, report: Event, closure: str | None = None
+    problem: Problem, settings: RoomSettings, marches: Marches, closure: str | None = None
 ) -> Background:
     """Forward runs of the room as stated on both grids, and derivatives on the coarse one: no image is used.
 
@@ -61,42 +66,44 @@ def background_of(
     prior = room_prior(
         problem, coarse.layout, log_viscosity_std=settings.log_viscosity_std, wall_heat=settings.wall_heat
     )
-    base = run_as_stated(coarse, prior, problem, settings, vertices, report)
+    marches.expect(fit_work(coarse, fine, prior, settings))
+    base = run_as_stated(coarse, prior, problem, settings, vertices, marches)
     flow = carried_over(base.flow.last, coarse.grid, fine.grid)
-    first = march_under(fine, prior.mean, flow, settings.refine_s, vertices, report)
-    derivatives = perturbed(coarse, prior, np.zeros(len(prior.active())), base, settings, vertices)
+    doing = "march the fine room as stated"
+    first = march_under(fine, prior.mean, flow, settings.refine_s, vertices, marches, doing=doing)
+    derivatives = perturbed(coarse, prior, np.zeros(len(prior.active())), base, settings, vertices, marches)
     # The unchanged restart has marched as long as the moved ones: it is what they are compared with.
     base = ForwardRun(base.parameters, base.flow, derivatives.start)
     return Background(problem, coarse, fine, prior, base, first, derivatives)
 
 
-def analyse(
-    background: Background, problem: Problem, settings: RoomSettings, report: Event, *, start_s: float
-) -> Solution:
+def analyse(background: Background, problem: Problem, settings: RoomSettings, marches: Marches) -> Solution:
     """The solution for the shifts of `problem`, which may be another measurement of the background's room.
 
     If another closure, or a heater that nobody stated, may explain the images better, that room is fitted as well and
     the better one is taken.
     """
-    analysis = fitted_room(background, problem, settings, report)
+    analysis = fitted_room(background, problem, settings, marches)
     notes: tuple[str, ...] = ()
     name = promising_closure(analysis, background.coarse) if settings.use_images else None
     if name is not None:
         again = fitted_room(
-            background_of(background.problem, settings, report, name), problem, settings, report
+            background_of(background.problem, settings, marches, name), problem, settings, marches
         )
         if left_over(again) < left_over(analysis):
             notes = (another_closure(name, left_over(again), background.coarse.closure, left_over(analysis)),)
             analysis = again
-    warm = suspected_heat(analysis, background, settings, report)
+    warm = suspected_heat(analysis, background, settings, marches)
     if warm is not None:
         again = fitted_room(
-            background_of(warm, settings, report, background.coarse.closure), problem, settings, report
+            background_of(warm, settings, marches, background.coarse.closure), problem, settings, marches
         )
         if left_over(again) < KEEP_HEAT * left_over(analysis):
             notes, analysis = (), again
-    report(supplied(analysis.layout, analysis.best))
-    return solution(analysis, time.perf_counter() - start_s, use_images=settings.use_images, notes=notes)
+    doing = "take the room that was found"
+    marches.record({"doing": doing, **supplied(analysis.layout, analysis.best)})
+    found = solution(analysis, marches.elapsed_s, use_images=settings.use_images, notes=notes)
+    return replace(found, history=tuple(marches.history))
 
 
 def data_of(background: Background, problem: Problem, settings: RoomSettings) -> Observations:
@@ -106,29 +113,32 @@ def data_of(background: Background, problem: Problem, settings: RoomSettings) ->
     return observations(of, (settings.vertices, settings.vertices, settings.vertices))
 
 
-def fitted_room(background: Background, problem: Problem, settings: RoomSettings, report: Event) -> Analysis:
+def fitted_room(
+    background: Background, problem: Problem, settings: RoomSettings, marches: Marches
+) -> Analysis:
     """The fit: parameters, then the level of T, and everything that the standard deviations need."""
     coarse, fine, prior = background.coarse, background.fine, background.prior
     vertices = (settings.vertices, settings.vertices, settings.vertices)
     data = data_of(background, problem, settings)
-    vector, base, linearised = coarse_fit(background, data, settings, report)
-    other = run_under_other_closure(coarse, prior.parameters(vector), base, settings, vertices)
+    vector, base, linearised = coarse_fit(background, data, settings, marches)
+    other = run_under_other_closure(coarse, prior.parameters(vector), base, settings, vertices, marches)
     first = background.first
     seconds = settings.refine_s + (0.0 if settings.use_images else settings.final_s)
     if np.any(vector) or not settings.use_images:
-        first = march_under(fine, prior.parameters(vector), first.flow.last, seconds, vertices, report)
+        where, flow, doing = prior.parameters(vector), first.flow.last, "march the fine room as corrected"
+        first = march_under(fine, where, flow, seconds, vertices, marches, doing=doing)
 
     def renewed(where: Vector) -> Derivatives:
-        return perturbed(coarse, prior, where, base, settings, vertices)
+        return perturbed(coarse, prior, where, base, settings, vertices, marches)
 
     derivatives = linearised
     if settings.use_images and prior.unknown_walls():
-        found, derivatives = fine_search(fine, prior, data, first, linearised, renewed, settings, report)
+        found, derivatives = fine_search(fine, prior, data, first, linearised, renewed, settings, marches)
     else:
-        found = fine_fit(fine, prior, data, vector, first, linearised, settings, report)
+        found = fine_fit(fine, prior, data, vector, first, linearised, settings, marches)
     before = best = found.room
     if settings.use_images:
-        best = held_fit(fine, prior, data, before, derivatives, settings, report)
+        best = held_fit(fine, prior, data, before, derivatives, settings, marches)
     return Analysis(
         background.problem,
         data,

@@ -9,6 +9,7 @@ from core.losses.boussinesq import FlowValues
 from core.losses.representation import Spans, Unknowns, positions
 from core.result import Outcome, Solution
 from core.solve.nondimensional import Frame
+from core.watch import Row
 
 
 def solution_of(
@@ -17,7 +18,7 @@ def solution_of(
     shape: tuple[int, int, int],
     outcome: Outcome,
     solver_s: float,
-    history: Sequence[dict[str, float]],
+    history: Sequence[Row],
     notes: tuple[str, ...] = (),
 ) -> Solution:
     """Evaluate on a vertex grid of `shape`."""

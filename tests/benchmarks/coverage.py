@@ -20,6 +20,7 @@ import numpy as np
 from app.bench.room_fit import coverage, problem_of
 from app.reconstruct.problem import with_scene
 from app.volume.score import score_solution
+from core.estimate.marches import Marches
 from core.problem import Problem
 from core.scene import BoundaryInformation, Heater, Inlet, Outlet, Wall
 from core.solve.room import RoomSettings, analyse, background_of
@@ -44,8 +45,8 @@ def main() -> None:
                 if options.misread:
                     problem, background = misread(problem, seed), None
                 # Without misreadings the coarse room as stated, and its derivatives, serve all seeds.
-                background = background or background_of(problem, settings, lambda _: None)
-                found = analyse(background, problem, settings, lambda _: None, start_s=time.perf_counter())
+                background = background or background_of(problem, settings, Marches())
+                found = analyse(background, problem, settings, Marches())
                 scores = score_solution(found, volume)
                 row = {"truth": path.stem, "information": information, "seed": seed, "cells": options.cells}
                 row |= {

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from fastapi import FastAPI
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, Route, expect, sync_playwright
 
 from app.api.factory import create_app
 from app.api.security.settings import ServiceConfig, new_token, service_config
@@ -107,6 +107,14 @@ class Watched:
 Opens = Callable[..., Watched]
 
 
+def _with_a_small_camera(route: Route) -> None:
+    """A simulated rig that the page makes has a camera that a busy machine can follow."""
+    if route.request.method == "POST":
+        route.continue_(post_data={**route.request.post_data_json, "camera_px": 384})
+    else:
+        route.continue_()
+
+
 @pytest.fixture
 def opens(chromium: Browser) -> Iterator[Opens]:
     """Open an address in a fresh context and watch for errors and violations of the policy."""
@@ -116,6 +124,7 @@ def opens(chromium: Browser) -> Iterator[Opens]:
         context = browser.new_context(**{"viewport": {"width": 1280, "height": 900}} | options)
         contexts.append(context)
         context.set_default_timeout(PATIENCE_MS)
+        context.route("**/api/experiments", _with_a_small_camera)
         page = context.new_page()
         complaints: list[str] = []
         page.on(

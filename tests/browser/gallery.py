@@ -1,4 +1,4 @@
-"""Takes a picture of every page, in light and dark, at two sizes, for somebody to look at.
+"""Takes a picture of every page, in light and dark, at three sizes, for somebody to look at.
 
     python -m tests.browser.gallery FOLDER [--plan]
 
@@ -17,7 +17,7 @@ from tests.browser.conftest import CHROMIUM, FLAGS, Station
 from tests.browser.test_look import keep, room
 
 PAGES = ("Rig", "Calibrate", "Plan", "Capture", "Reconstruct", "Look")
-SIZES = ((1024, 768), (1440, 900))
+SIZES = ((390, 844), (1024, 768), (1440, 900))
 
 
 def furnish(station: Station, planned: bool) -> None:

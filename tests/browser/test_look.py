@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import Locator, Page, expect
 
+from app.client import Client
 from app.experiment.folder import Experiment, write_manifest
 from app.experiment.results import write_result
 from app.files.durable import write_json, write_text
+from app.files.toml import to_plain
 from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.file import read_volume
 from core.result import Outcome, Solution
@@ -54,6 +56,7 @@ def keep(experiment: Experiment, name: str, solution: Solution, preset: str, los
         "preset": preset,
         "solve": {"cells": 48, "rounds": len(preset)},
         "created": "2026-01-01T00:00:00+00:00",
+        "settings": to_plain(experiment.settings),
     }
     write_manifest(folder, settings)
 
@@ -90,12 +93,19 @@ def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: 
     expect(page.locator(".bar").first).to_contain_text("found minus true")
     snapshot(page, "look-error")
     choose(page, "T")
+    slices.first.hover()
+    expect(page.locator(".slice .probe").first).to_contain_text(re.compile(r"°C, ± 0\.196 \(95 %\)"))
+    page.get_by_role("checkbox", name="°C").uncheck()
+    slices.nth(1).hover()
+    expect(page.locator(".slice .probe").nth(1)).to_contain_text(re.compile(r"\d K, ±"))
+    page.get_by_label("Leave out extremes").check()
+    expect(page.locator(".bar").first).to_contain_text("they have the end's colour")
     page.get_by_role("button", name="Its uncertainty").click()
     expect(page.locator(".bar").first).to_contain_text("standard deviation of T")
     page.get_by_role("button", name="Back to T").click()
 
     choose(page, "20260101T000000-standard", "Compare with")
-    expect(page.locator("main")).to_contain_text("solve.rounds")
+    expect(page.locator("main")).to_contain_text("solve: rounds")
     expect(slices).to_have_count(9)
     expect(slices.nth(8)).to_have_attribute("data-painted", PAINTED)
     expect(page.locator(".chart canvas")).to_be_visible()
@@ -105,17 +115,23 @@ def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: 
     snapshot(page, "look-two-results")
     choose(page, "", "Compare with")
 
-    page.get_by_role("button", name="Show the volume").click()
     place = page.locator(".volume")
-    expect(place).to_have_attribute("data-frame-ms", PAINTED)
-    pictures = {"volume": place.screenshot()}
-    page.get_by_label("Volume", exact=True).uncheck()
-    for mode in ("Isosurface", "Arrows", "Streamlines"):
-        page.get_by_label(mode).check()
+    expect(place.locator("[data-frame-ms]")).to_be_attached()
+    expect(place).to_contain_text("supply")
+    expect(place).to_contain_text("x [m]")
+    expect(page.locator(".room3d")).to_contain_text("speed of lines and arrows")
+    pictures = {"plane and streamlines": place.screenshot()}
+    page.get_by_label("Streamlines").uncheck()
+    pictures["plane"] = another(place, set(pictures.values()))
+    page.get_by_label("Plane", exact=True).uncheck()
+    for mode in ("Isosurface", "Arrows", "Volume"):
+        page.get_by_label(mode, exact=True).check()
         pictures[mode] = another(place, set(pictures.values()))
         snapshot(page, f"look-{mode.lower()}")
-        page.get_by_label(mode).uncheck()
-    page.get_by_label("Volume", exact=True).check()
+        page.get_by_label(mode, exact=True).uncheck()
+    page.get_by_label("Plane", exact=True).check()
+    page.get_by_role("button", name="Top", exact=True).click()
+    another(place, set(pictures.values()))
     with page.expect_download() as download:
         page.get_by_role("button", name="Keep the picture").click()
     assert Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
@@ -128,3 +144,17 @@ def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: 
         page.get_by_role("button", name="Report").click()
     expect(opened.value.get_by_role("heading")).to_have_text("Report")
     assert watched.complaints == []
+
+
+def test_streamlines_move_where_motion_is_wanted(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=64).experiment
+    keep(station.app.state.services.folders.open(name), "20260101T000000-standard", room(), "standard", 1.0)
+    page = opens(station.address, reduced_motion="reduce").page
+    page.get_by_role("button", name="Look", exact=True).click()
+    place = page.locator(".volume > div")
+    expect(place).to_have_attribute("data-frame-ms", PAINTED)
+    expect(place).not_to_have_attribute("data-moved", PAINTED)
+    page.get_by_label("Moving").check()
+    expect(place).to_have_attribute("data-moved", re.compile(r"\d\d"))
+    page.get_by_label("Moving").uncheck()

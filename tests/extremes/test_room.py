@@ -53,7 +53,7 @@ def kept(side: str, kelvin: float, viscosity_m2_s: float) -> Row:
     return Row(STAGE, f"{name}: keeps its heat", run, Near(4.0, rel=1e-4))
 
 
-def moves(side: str, kelvin: float, expected: Within) -> Row:
+def moves(side: str, kelvin: float, expected: Near | Within) -> Row:
     """Speed over the free fall's."""
     return Row(STAGE, f"{kelvin:g} K in {side}: speed", lambda: marched(side, kelvin, 0.0)[1], expected)
 
@@ -101,9 +101,10 @@ ROWS = [
     *[bounded(*case) for case in CASES],
     *[kept(*case) for case in CASES if case[1] > 0],
     moves("1 m", 0.0, Within(0.0, 0.0)),
-    moves("1 m", 10.0, Within(0.01, 2.0)),
-    moves("1 m", 2000.0, Within(0.01, 2.0)),
-    moves("100 m", 2000.0, Within(0.01, 2.0)),
+    # In free fall's time and speed the flow is the same at every size: 0.1964 to 0.1967, as viscosity matters less.
+    moves("1 m", 10.0, Near(0.1966, rel=0.003)),
+    moves("1 m", 2000.0, Near(0.1966, rel=0.003)),
+    moves("100 m", 2000.0, Near(0.1966, rel=0.003)),
     laid("an inlet and an outlet", Near(0.5, rel=1e-6), inlet(), outlet()),
     laid("nothing stated", Near(0.0)),
     laid("an inlet of 1 mm", Near(5e-7, rel=1e-5), inlet(lower_m=(1.0, 1.0), upper_m=(1.001, 1.001)), outlet()),

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from app.experiment.results import read_result
 from app.files.provenance import sha256
 from app.pipeline import reconstruct
 from app.report.page import report_again
+from core.watch import Watch
 
 
 @pytest.fixture(scope="module")
@@ -24,8 +26,8 @@ def disturbed(experiment, tmp_path_factory):
     # A page cannot be put in the place of a folder that holds something: any OSError ends the same way.
     (into / "report.html" / "in the way").mkdir(parents=True)
 
-    def another_capture(stage: str) -> None:
-        if stage.startswith("solve"):
+    def another_capture(row: Mapping[str, float | str], growing: object) -> None:
+        if str(row["doing"]).startswith("solve ("):
             later = copy / "captures" / "29990101T000000-flow"
             shutil.copytree(used, later)
             manifest = json.loads((later / "manifest.json").read_text()) | {
@@ -33,7 +35,7 @@ def disturbed(experiment, tmp_path_factory):
             }
             (later / "manifest.json").write_text(json.dumps(manifest))
 
-    return used, reconstruct(copy, "draft", on_stage=another_capture, into=into)
+    return used, reconstruct(copy, "draft", watch=Watch(another_capture), into=into)
 
 
 def test_a_capture_finished_meanwhile_is_not_the_one_that_was_used(disturbed):

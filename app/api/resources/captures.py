@@ -25,6 +25,7 @@ from app.api.wire.problems import ApiError
 from app.api.wire.revision import IfMatch, check_revision, etag
 from app.api.wire.volumes import Encoding, pack
 from app.capture.burst import Order
+from app.capture.service import DeskState
 from app.errors import BadInputError
 from app.experiment.capture_files import BurstImage
 from app.experiment.captures import load_capture
@@ -68,8 +69,11 @@ def order_of(new: NewCapture) -> Order:
 
 @router.get("/experiments/{experiment}/captures")
 def list_captures(given: Given, experiment: Identifier) -> list[CaptureResource]:
-    """List the captures, newest first; interrupted ones last."""
+    """List the captures, newest first; interrupted ones last, the one that is being taken not yet."""
     done, broken = given.folders.items(experiment, "capture")
+    desk = given.desk.status
+    if desk.state is DeskState.running and desk.experiment == experiment:
+        broken = [folder for folder in broken if folder.name != desk.capture]
     return [_line(folder) for folder in done] + [_bare(folder, "interrupted") for folder in broken]
 
 

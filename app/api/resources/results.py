@@ -99,7 +99,7 @@ def read_slice(
 
 @router.get("/experiments/{experiment}/results/{result}/history")
 def read_history(given: Given, experiment: Identifier, result: Identifier) -> list[dict[str, float | None]]:
-    """Return what was recorded while it was solved, one object a recorded iteration."""
+    """Return the numbers that were recorded while it was solved, one object a recorded iteration."""
     path = given.folders.item(experiment, "result", result) / "history.jsonl"
     if not path.is_file():
         return []
@@ -242,4 +242,5 @@ def _finite(entry: dict[str, Any]) -> dict[str, float | None]:
     return {
         key: float(value) if isinstance(value, int | float) and abs(value) < 1e308 else None
         for key, value in entry.items()
+        if not isinstance(value, str)
     }

@@ -42,7 +42,8 @@ class _Told:
         while events := ledger.events(after=self._last_event, job=job, limit=PAGE):
             for event in events:
                 if event.kind == "progress" and isinstance(event.body.get("step"), int):
-                    self._rows[event.body["step"]] = event.body
+                    step = event.body["step"]
+                    self._rows[step] = {**self._rows.get(step, {}), **event.body}
             self._last_event = events[-1].id
 
     def columns(self, points: int) -> tuple[list[int], dict[str, list[float | None]]]:

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections import deque
+from collections.abc import Callable
 
 from app.jobs import Event, Ledger
 
@@ -11,10 +12,10 @@ PAGE = 500
 
 
 class EventFeed:
-    """The newest events in memory; older ones come from the ledger."""
+    """The newest events in memory; older ones come from the ledger. `catch_up` tells what could not be told."""
 
-    def __init__(self, ledger: Ledger) -> None:
-        self._ledger = ledger
+    def __init__(self, ledger: Ledger, catch_up: Callable[[], object] = lambda: None) -> None:
+        self._ledger, self._catch_up = ledger, catch_up
         self._recent: deque[Event] = deque(maxlen=KEPT)
         self._newest: int | None = None
         self._looking: asyncio.Task[None] | None = None
@@ -37,6 +38,7 @@ class EventFeed:
 
     async def _look_once(self) -> None:
         await asyncio.sleep(LOOK_S)
+        await asyncio.to_thread(self._catch_up)
         found = await asyncio.to_thread(self._ledger.events, after=self._newest or 0, limit=PAGE)
         if found:
             self._recent.extend(found)

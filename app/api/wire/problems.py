@@ -30,7 +30,7 @@ KINDS: Mapping[str, Kind] = {
     "origin_refused": Kind(
         403, "Requests from this page are refused", "Open the address of the service itself in the browser."
     ),
-    "not_found": Kind(404, "There is no such thing", "List the parent resource to see what there is."),
+    "not_found": Kind(404, "Not found", "List the parent resource to see what there is."),
     "method_not_allowed": Kind(405, "This cannot be done here", "Use one of the methods in `Allow`."),
     "conflict": Kind(409, "The state does not allow this", "Read the resource's state and try again."),
     "changed": Kind(

@@ -1,22 +1,28 @@
 """Kind `reconstruct`: the pipeline on the newest captures of an experiment, as `airlens reconstruct` runs it.
 
-The result is made in a hidden folder beside the experiment's results and put in place by one rename.
-A solver that keeps checkpoints goes on from its last one; another starts again.
+The result is made in a hidden folder beside the experiment's results and put in place by one rename. A solver goes
+on from what an earlier attempt kept.
 """
 
 import itertools
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
 from app.files.toml import Strict, parse
-from app.jobs.attempt import Attempt
+from app.jobs.attempt import SHOWN_EVERY_S, Attempt, AttemptStoppedError
 from app.jobs.checkpoints import FolderStore
 
+if TYPE_CHECKING:
+    from core.result import Solution
+
 EXPERIMENT = True
+# A share of the work is told in so many parts.
+_PARTS = 1000
 
 
 class ReconstructSettings(Strict):
@@ -38,39 +44,48 @@ def target(order: Mapping[str, Any], folder: Path) -> Path:
 
 
 def run(attempt: Attempt, settings: ReconstructSettings) -> dict[str, Any]:
-    """Reconstruct; return how it ended."""
+    """Reconstruct; return how it ended. Raises AttemptStoppedError."""
     # Imported here: reading a job's settings must not cost the start of the array library.
+    from app.experiment.folder import open_experiment
     from app.pipeline import reconstruct
-    from core.result import Outcome
+    from core.watch import StoppedError, Watch
 
-    def on_stage(stage: str) -> None:
-        attempt.check_stop()
-        attempt.tell("stage", {"stage": stage})
-
-    told = itertools.count(1)
-
-    def on_event(row: Mapping[str, Any]) -> None:
-        if "excess_plane_k" in row:
-            attempt.show(row["excess_plane_k"])
-        numbers = {name: float(value) for name, value in row.items() if isinstance(value, int | float)}
-        if numbers:
-            # A march has no steps of equal worth: its rows are counted.
-            step = int(numbers.pop("step", numbers.pop("iteration", 0))) or next(told)
-            attempt.progress(step, int(numbers.pop("steps", 0)), numbers)
-
-    done = reconstruct(
-        attempt.experiment_folder(),
-        settings.preset,
-        on_stage=on_stage,
-        on_event=on_event,
-        into=attempt.output,
-        store=FolderStore(attempt.checkpoints),
-        should_stop=attempt.stop.is_set,
-    )
-    if done.solution.outcome is Outcome.stopped:
-        attempt.check_stop()
-    warm_k = done.solution.temperature_k
-    ambient_k = done.problem.scene.air.ambient_temperature_k
-    attempt.show((warm_k[:, warm_k.shape[1] // 2] - ambient_k).astype("float32"), last=True)
+    experiment = attempt.experiment_folder()
+    ambient_k = open_experiment(experiment).settings.scene.air.ambient_temperature_k
+    told = _Teller(attempt, ambient_k)
+    watch = Watch(told, attempt.stop.is_set, FolderStore(attempt.checkpoints))
+    try:
+        done = reconstruct(experiment, settings.preset, watch=watch, into=attempt.output)
+    except StoppedError as error:
+        raise AttemptStoppedError from error
+    told.show(done.solution, last=True)
     ended = {"preset": done.finding.manifest["preset"], "outcome": done.solution.outcome.name}
     return ended | ({"no_report": done.no_report} if done.no_report else {})
+
+
+class _Teller:
+    """Turns a solver's rows into the attempt's events: what is being done, how much is done, how the field grows."""
+
+    def __init__(self, attempt: Attempt, ambient_k: float) -> None:
+        self._attempt, self._ambient_k = attempt, ambient_k
+        self._doing, self._count, self._shown_s = "", itertools.count(1), float("-inf")
+
+    def __call__(self, row: Mapping[str, float | str], growing: "Callable[[], Solution] | None") -> None:
+        doing = str(row["doing"])
+        if doing != self._doing:
+            self._doing = doing
+            self._attempt.tell("stage", {"stage": doing})
+        numbers = {name: float(value) for name, value in row.items() if not isinstance(value, str)}
+        if numbers:
+            counted = next(self._count)
+            share = numbers.pop("share", None)
+            step, steps = (counted, 0) if share is None else (round(_PARTS * share), _PARTS)
+            self._attempt.progress(step, steps, numbers)
+        if growing is not None and time.monotonic() - self._shown_s >= SHOWN_EVERY_S:
+            self.show(growing())
+            self._shown_s = time.monotonic()
+
+    def show(self, air: "Solution", *, last: bool = False) -> None:
+        """Show the middle plane [x, z] of the temperature above ambient."""
+        plane_k = air.temperature_k[:, air.temperature_k.shape[1] // 2] - self._ambient_k
+        self._attempt.show(plane_k.astype("float32"), last=last)

@@ -11,8 +11,9 @@ from core.rays.operator import StraightRayOperator, build
 from core.result import Solution
 from core.scene import Scene
 from core.solve.check import check_problem
-from core.solve.draft.temperature import OnEvent, solve_temperature
+from core.solve.draft.temperature import solve_temperature
 from core.solve.draft.temperature_prior import TemperatureSettings
+from core.watch import Watch
 
 _apply = jax.jit(lambda operator, values: operator.apply(values))
 _transpose = jax.jit(lambda operator, shift: operator.transpose(shift))
@@ -52,13 +53,16 @@ def draft_grid(scene: Scene) -> VertexGrid:
 
 
 def solve_draft(
-    problem: Problem, settings: TemperatureSettings | None = None, *, on_event: OnEvent | None = None
+    problem: Problem, settings: TemperatureSettings = TemperatureSettings(), watch: Watch = Watch()
 ) -> Solution:
-    """Temperature in at most some ten seconds. Raises SettingError."""
+    """Temperature in at most some ten seconds; nothing is kept of one that is stopped.
+
+    Raises SettingError, StoppedError.
+    """
     check_problem(problem, "bos+boundary")
     grid = draft_grid(problem.scene)
     operators = tuple(
         _OnTheDevice(build(problem.scene, view, shift.centres_px, grid.shape, float(shift.window_px)))
         for view, shift in enumerate(problem.shifts)
     )
-    return solve_temperature(problem, operators, grid, settings or TemperatureSettings(), on_event)
+    return solve_temperature(problem, operators, grid, settings, watch)

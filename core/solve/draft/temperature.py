@@ -18,7 +18,6 @@ what varies along the rays and is not on a known plane stays unseen.
 
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
@@ -49,8 +48,7 @@ from core.solve.draft.temperature_system import (
     preconditioner,
     steepest_slopes,
 )
-
-OnEvent = Callable[[dict[str, Any]], object]
+from core.watch import Row, Watch
 
 # Thinner air than at this temperature is none: without a limit 0 K comes next, and then less.
 _HOTTEST_K = 5000.0
@@ -69,22 +67,29 @@ def solve_temperature(
     operators: tuple[ShiftOperator, ...],
     grid: VertexGrid,
     settings: TemperatureSettings,
-    on_event: OnEvent | None = None,
+    watch: Watch = Watch(),
 ) -> Solution:
     """Temperature on `grid`; one operator a view. Raises SettingError for contradictory knowledge."""
     started = time.perf_counter()
     air = problem.scene.air
     system, prior = _system(problem, operators, grid, settings)
     inverse = preconditioner(system)
-    n, iterations, settled = _minimise(system, inverse, problem.shifts, prior, air, settings, on_event)
+    n, history, settled = _minimise(system, inverse, problem.shifts, prior, air, settings, watch)
     doubted = system.with_fewer_data(settings.together * _paths(problem) ** 2)
     rough = preconditioner(doubted)
-    std = deviation(
-        doubted, lambda rhs: _solved(doubted, rough, rhs, _DRAWN, settings)[0], settings.draws, seed=0
-    )
-    index = n + air.ambient_refractivity
-    thinnest = air.ambient_refractivity * air.ambient_temperature_k / _HOTTEST_K
-    temperature = air.ambient_refractivity * air.ambient_temperature_k / np.maximum(index, thinnest)
+
+    def drawn(rhs: Volume) -> Volume:
+        # The field and the draws are solves of one kind, so their number says how much is done.
+        done = sum("draw" in row for row in history) + 1.0
+        found, _ = _solved(doubted, rough, rhs, _DRAWN, settings, watch)
+        elapsed_s, share = time.perf_counter() - started, (1.0 + done) / (1.0 + settings.draws)
+        row = {"doing": "draw what may be otherwise", "draw": done, "share": share, "elapsed_s": elapsed_s}
+        history.append(row)
+        watch.tell(row)
+        return found
+
+    std = deviation(doubted, drawn, settings.draws, seed=0)
+    temperature = _kelvin(air, n)
     # dT = (T / T0)^2 dn T0 / N0.
     std_k = std / system.per_k * (temperature / air.ambient_temperature_k) ** 2
     x, y, z = grid.axes_m
@@ -96,13 +101,24 @@ def solve_temperature(
         temperature_std_k=std_k if settings.draws else None,
         outcome=Outcome.converged if settled else Outcome.step_limit,
         solver_s=time.perf_counter() - started,
-        history=iterations,
+        history=tuple(history),
         notes=(
             "Temperature only: velocity and pressure are not solved for by this preset.",
             "What varies along the line of sight comes from the prior, not from the images.",
-            *([_NOT_AIR] if (index < thinnest).any() else []),
+            *([_NOT_AIR] if (n < _thinnest(air) - air.ambient_refractivity).any() else []),
         ),
     )
+
+
+def _kelvin(air: Air, n: Volume) -> Volume:
+    """Temperature of air of this excess refractivity, at most the hottest."""
+    index = np.maximum(n + air.ambient_refractivity, _thinnest(air))
+    return air.ambient_refractivity * air.ambient_temperature_k / index
+
+
+def _thinnest(air: Air) -> float:
+    """Refractivity of the hottest air."""
+    return air.ambient_refractivity * air.ambient_temperature_k / _HOTTEST_K
 
 
 def _system(
@@ -151,22 +167,23 @@ def _minimise(
     prior: Volume,
     air: Air,
     settings: TemperatureSettings,
-    on_event: OnEvent | None,
-) -> tuple[Volume, tuple[dict[str, float], ...], bool]:
+    watch: Watch,
+) -> tuple[Volume, list[Row], bool]:
     """Conjugate gradients on the departure from the prior."""
-    shape, ambient = system.grid.shape, air.ambient_temperature_k
-    history: list[dict[str, float]] = []
+    began_s = time.perf_counter()
+    history: list[Row] = []
+    x, y, z = system.grid.axes_m
 
     def record(flat: np.ndarray) -> None:
-        history.append({"iteration": len(history) + 1.0, "change": float(np.abs(flat).max() / system.per_k)})
-        if on_event:
-            n = (prior + flat.reshape(shape))[:, shape[1] // 2]
-            plane = -ambient * n / (air.ambient_refractivity + n)
-            on_event({**history[-1], "excess_plane_k": plane.astype(np.float32)})
+        change_k, elapsed_s = float(np.abs(flat).max() / system.per_k), time.perf_counter() - began_s
+        row = {"doing": "fit the temperature", "iteration": len(history) + 1.0, "change": change_k}
+        history.append({**row, "elapsed_s": elapsed_s})
+        n = prior + flat.reshape(system.grid.shape)
+        watch.tell(history[-1], lambda: Solution(x, y, z, _kelvin(air, n), outcome=Outcome.step_limit))
 
     rhs = _right_hand_side(system, shifts, prior, air)
-    found, settled = _solved(system, inverse, rhs, settings.tolerance, settings, record)
-    return prior + found, tuple(history), settled
+    found, settled = _solved(system, inverse, rhs, settings.tolerance, settings, watch, record)
+    return prior + found, history, settled
 
 
 def _right_hand_side(system: System, shifts: tuple[ShiftMeasurement, ...], prior: Volume, air: Air) -> Volume:
@@ -189,11 +206,13 @@ def _solved(
     rhs: Volume,
     tolerance: float,
     settings: TemperatureSettings,
+    watch: Watch,
     record: Callable[[np.ndarray], None] | None = None,
 ) -> tuple[Volume, bool]:
-    """The Hessian's inverse times `rhs`, and whether it was reached."""
+    """The Hessian's inverse times `rhs`, and whether it was reached. Raises StoppedError between two products."""
 
     def hessian(flat: np.ndarray) -> np.ndarray:
+        watch.check_stop()
         n = flat.reshape(rhs.shape)
         return (system.data_terms(n) + system.known_terms(n) + system.smooth(n)).ravel()
 

@@ -7,7 +7,6 @@ steps a level, each some tens of CG iterations of two linearised residuals.
 import dataclasses
 import time
 from collections.abc import Callable
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -15,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
+from core.checkpoint import claim, digest, encode, keep, newest, restore
 from core.grid.multiresolution import MultiGrid, zero_multigrid
 from core.grid.staggered import StaggeredGrid
 from core.losses.physics import Loss, all_rows
@@ -23,14 +23,12 @@ from core.problem import Problem
 from core.result import Outcome, Solution
 from core.setting import SettingError, setting
 from core.solve.check import check_problem
-from core.solve.checkpoint import CheckpointStore, configuration_hash, encode, newest, restore
 from core.solve.grid.gauss_newton import Step, column_scale, gauss_newton_step
 from core.solve.grid.start import starting_flow
 from core.solve.nondimensional import Frame, frame_of
 from core.solve.regime import DataModel, Regime, Weights, losses_of
 from core.solve.solution import solution_of
-
-OnEvent = Callable[[dict[str, Any]], object]
+from core.watch import Row, StoppedError, Store, Watch
 
 # The columns' sizes are measured before a level's first two steps: the first sets the air in motion.
 _SCALED_AT = (0, 1)
@@ -73,44 +71,42 @@ class GridState(eqx.Module):
 def solve_grid(
     problem: Problem,
     settings: GridSettings,
-    *,
-    on_event: OnEvent | None = None,
-    store: CheckpointStore | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    watch: Callable[[Solution], object] | None = None,
+    watch: Watch = Watch(),
 ) -> Solution:
-    """T, p, u on vertices, `cells` + 1 an axis. Raises SettingError for a problem that cannot be solved.
+    """T, p, u on vertices, `cells` + 1 an axis.
 
-    A run that `store` knows of goes on with the step it was at and ends bitwise as it would have on a CPU.
-    `should_stop` is asked about every second, but not while a level compiles. `watch` sees each step taken.
+    A run that `watch.store` knows of goes on with the step it was at and ends bitwise as it would have on a CPU.
+    A stop is heard within about a second, but not while a level compiles.
+
+    Raises SettingError for a problem that cannot be solved, ForeignCheckpointError, StoppedError.
     """
     check_problem(problem, settings.regime)
-    clock = _Clock(settings.time_limit_s, should_stop or (lambda: False))
+    clock = _Clock(settings.time_limit_s, watch.should_stop)
     frame = frame_of(problem)
-    keeper = _Keeper(store, configuration_hash(_lasting(settings), problem.scene))
+    keeper = _Keeper(watch.store, digest(_lasting(settings), problem))
     state, history = keeper.resumed(problem, frame, settings)
     while True:
         cells = _multigrid(state.unknowns).finest.cells[0]
 
-        def taken(state: GridState, history: list[dict[str, float]], cells: int = cells) -> None:
+        def taken(state: GridState, history: list[Row], cells: int = cells) -> None:
             keeper.save(state, history)
-            if on_event:
-                on_event(history[-1])
-            if watch is not None:
-                shape = _cubic(cells + 1)
-                watch(solution_of(state.unknowns, frame, shape, Outcome.step_limit, clock.elapsed_s, ()))
+            shape, unknowns, now_s = _cubic(cells + 1), state.unknowns, clock.elapsed_s
+            watch.tell(
+                history[-1], lambda: solution_of(unknowns, frame, shape, Outcome.step_limit, now_s, ())
+            )
 
         losses = losses_of(
             problem, frame, settings.regime, settings.weights, settings.data, _cubic(cells + 1), 2 * cells + 1
         )
         state, outcome = _descend(state, losses, settings, history, clock, taken)
-        if cells == settings.cells or outcome in (Outcome.nonfinite, Outcome.time_limit, Outcome.stopped):
+        if outcome is None:
+            keeper.save(state, history, final=True)
+            raise StoppedError
+        if cells == settings.cells or outcome in (Outcome.nonfinite, Outcome.time_limit):
             break
         # The next level compiles first, and compilation cannot be interrupted.
         keeper.save(state, history, final=True)
         state = _at_start(Unknowns(_multigrid(state.unknowns).refined(), *_others(state.unknowns)), settings)
-    if outcome is Outcome.stopped:
-        keeper.save(state, history, final=True)
     shape = _cubic(settings.cells + 1)
     return solution_of(state.unknowns, frame, shape, outcome, clock.elapsed_s, history)
 
@@ -148,11 +144,14 @@ def _descend(
     state: GridState,
     losses: tuple[Loss, ...],
     settings: GridSettings,
-    history: list[dict[str, float]],
+    history: list[Row],
     clock: "_Clock",
-    taken: Callable[[GridState, list[dict[str, float]]], None],
-) -> tuple[GridState, Outcome]:
-    """Gauss-Newton on one level until a step gains less than `settled`; a bad step is taken back."""
+    taken: Callable[[GridState, list[Row]], None],
+) -> tuple[GridState, Outcome | None]:
+    """Gauss-Newton on one level until a step gains less than `settled`; a bad step is taken back.
+
+    The outcome is None where a stop was asked for.
+    """
     outcome = Outcome.step_limit if int(state.step) else Outcome.converged
     while not bool(state.ended):
         if clock.is_over:
@@ -165,10 +164,10 @@ def _descend(
             scale=state.scale, should_stop=clock.should_stop,
         )  # fmt: skip
         if step is None:
-            return state, Outcome.stopped
+            return state, None
         if not np.isfinite(float(step.cost_before)):
             return state, Outcome.nonfinite
-        history.append(_record(step, state, clock.elapsed_s))
+        history.append(_record(step, state, clock.elapsed_s, settings))
         state, outcome = _judged(state, step, settings)
         taken(state, history)
     return state, outcome
@@ -203,15 +202,27 @@ def _others(unknowns: Unknowns) -> tuple[Array | None, Array | None]:
     return unknowns.drift_px, unknowns.log_transport
 
 
-def _record(step: Step, state: GridState, elapsed_s: float) -> dict[str, float]:
+def _record(step: Step, state: GridState, elapsed_s: float, settings: GridSettings) -> Row:
+    cells, number = _multigrid(state.unknowns).finest.cells[0], int(state.step) + 1
     return {
-        "cells": float(_multigrid(state.unknowns).finest.cells[0]),
+        "doing": "descend on the grid",
+        "cells": float(cells),
+        "share": _share(cells, number, settings),
         "loss": 2 * float(step.cost_before),
         "loss_after": 2 * float(step.cost_after),
         "cg_iterations": float(step.cg_iterations),
         "damping": float(state.damping),
         "elapsed_s": elapsed_s,
     }
+
+
+def _share(cells: int, steps: int, settings: GridSettings) -> float:
+    """Of the work of all levels, each with all its steps, what is done after so many on the level of `cells`."""
+    levels = [settings.coarsest]
+    while levels[-1] < settings.cells:
+        levels.append(2 * levels[-1])
+    before = sum(n**3 for n in levels if n < cells)
+    return (before + cells**3 * steps / settings.steps_a_level) / sum(n**3 for n in levels)
 
 
 def _lasting(settings: GridSettings) -> GridSettings:
@@ -237,16 +248,16 @@ class _Clock:
 class _Keeper:
     """Saves after a step, at a cost of at most 1 % of the time; finds the state to start from."""
 
-    def __init__(self, store: CheckpointStore | None, configuration: str) -> None:
+    def __init__(self, store: Store | None, configuration: str) -> None:
         self._store, self._configuration = store, configuration
+        if store is not None:
+            claim(store, configuration)
         self._last, self._cost_s = time.perf_counter(), 0.0
 
-    def resumed(
-        self, problem: Problem, frame: Frame, settings: GridSettings
-    ) -> tuple[GridState, list[dict[str, float]]]:
+    def resumed(self, problem: Problem, frame: Frame, settings: GridSettings) -> tuple[GridState, list[Row]]:
         """The newest checkpoint's state and history, or the start's."""
         state = _at_start(initial_unknowns(problem, frame, settings), settings)
-        found = newest(self._store) if self._store else None
+        found = newest(self._store) if self._store is not None else None
         if found is None:
             return state, []
         history = list(found.header["history"])
@@ -256,7 +267,7 @@ class _Keeper:
             state = _at_start(Unknowns(finer, *_others(state.unknowns)), settings)
         return restore(found, state, configuration=self._configuration), history
 
-    def save(self, state: GridState, history: list[dict[str, float]], *, final: bool = False) -> None:
+    def save(self, state: GridState, history: list[Row], *, final: bool = False) -> None:
         """Keep the state, if it is time or the last chance."""
         now = time.perf_counter()
         if self._store is None or not (final or now - self._last >= 100 * self._cost_s):
@@ -269,6 +280,6 @@ class _Keeper:
             history=history,
             shape={"cells": _multigrid(state.unknowns).finest.cells[0]},
         )
-        self._store.save(content)
+        keep(self._store, content)
         self._last = time.perf_counter()
         self._cost_s = self._last - now

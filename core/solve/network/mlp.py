@@ -7,7 +7,6 @@ settings here.
 
 import dataclasses
 import time
-from collections.abc import Callable
 from typing import Any, Literal
 
 import equinox as eqx
@@ -15,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import optax
 
+from core.checkpoint import digest
 from core.losses.physics import BoundaryLoss, Loss, PhysicsLoss, total
 from core.losses.representation import Unknowns
 from core.losses.shifts import ShiftLoss
@@ -24,14 +24,12 @@ from core.problem import Problem
 from core.result import Outcome, Solution
 from core.setting import setting
 from core.solve.check import check_problem
-from core.solve.checkpoint import CheckpointStore, configuration_hash
 from core.solve.loop import LoopSettings, run
 from core.solve.network.mlp_start import network_like
 from core.solve.nondimensional import frame_of
 from core.solve.regime import DataModel, Regime, Weights, losses_of
 from core.solve.solution import solution_of
-
-OnEvent = Callable[[dict[str, Any]], object]
+from core.watch import Watch
 
 
 @setting
@@ -65,16 +63,15 @@ class MlpSolveSettings:
 def solve_mlp(
     problem: Problem,
     settings: MlpSolveSettings,
+    watch: Watch = Watch(),
     *,
-    on_event: OnEvent | None = None,
-    store: CheckpointStore | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    watch: Callable[[Solution], object] | None = None,
     start: Solution | None = None,
 ) -> Solution:
     """T, p, u on `result_vertices` vertices an axis; `start` is a solution that the network first imitates.
 
-    Raises SettingError before the first iteration.
+    A run that `watch.store` knows of goes on with the step it was at, and ends bitwise as it would have on a CPU.
+
+    Raises SettingError before the first iteration, ForeignCheckpointError, StoppedError.
     """
     check_problem(problem, settings.regime)
     began = time.perf_counter()
@@ -93,9 +90,8 @@ def solve_mlp(
     losses = tuple(_with_batches(loss, settings) for loss in losses)
     r = settings.result_vertices
 
-    def show(unknowns: Unknowns, elapsed_s: float) -> None:
-        if watch is not None:
-            watch(solution_of(unknowns, frame, (r, r, r), Outcome.step_limit, elapsed_s, ()))
+    def growing(unknowns: Unknowns, elapsed_s: float) -> Solution:
+        return solution_of(unknowns, frame, (r, r, r), Outcome.step_limit, elapsed_s, ())
 
     unknowns = initial_unknowns(problem, settings, frame.lower, frame.upper)
     network = unknowns.representation
@@ -108,11 +104,9 @@ def solve_mlp(
         losses,
         _optimiser(settings),
         settings.loop,
-        configuration=configuration_hash(_lasting(settings), problem.scene),
-        on_event=on_event,
-        store=store,
-        should_stop=should_stop,
-        watch=show,
+        configuration=digest(_lasting(settings), problem, start),
+        watch=watch,
+        growing=growing,
     )
     notes = (
         f"{settings.network.hidden_layers} x {settings.network.width} {settings.network.activation} network; "

@@ -14,6 +14,7 @@ from app.capture.burst import Order
 from app.capture.service import CaptureDesk
 from app.cli import create_cli
 from app.commands import COMMANDS
+from app.commands.calibrate import STEPS
 from app.commands.lazy import commands_of
 from app.experiment.captures import load_capture
 from app.experiment.folder import Experiment
@@ -32,9 +33,12 @@ SHELL = {"experiment", "as_json", "on_abort", "help"}
 def options_of(*path: str) -> dict[str, Any]:
     """A command's options by the names of their fields."""
     first, *rest = path
-    command: Any = commands_of(COMMANDS[first][0])[first]
-    for name in rest:
-        command = command.commands[name]
+    if first == "calibrate":
+        command: Any = commands_of(STEPS[rest[0]][0])[rest[0]]
+    else:
+        command = commands_of(COMMANDS[first][0])[first]
+        for name in rest:
+            command = command.commands[name]
     return {p.name: p for p in command.params if p.param_type_name == "option"}
 
 
@@ -94,7 +98,7 @@ def by_service(experiment: Experiment) -> None:
     desk = CaptureDesk(live, lambda kind, body: None)
     try:
         desk.start(experiment, order_of(NewCapture.model_validate(ASKED | {"role": "reference"})))
-        desk._thread.join(200)
+        desk.wait(200)
         assert (desk.status.state, desk.status.burst, desk.status.reason) == ("finished", 2, "")
     finally:
         live.close()

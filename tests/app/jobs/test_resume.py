@@ -16,7 +16,7 @@ from app.experiment.results import read_result
 from app.jobs import JobSpec, Ledger
 from app.jobs.folder import JobFolder, Owner
 from app.jobs.worker_status import DONE
-from core.solve.checkpoint import decode
+from core.checkpoint import decode
 
 ROOT = Path(__file__).parents[3]
 

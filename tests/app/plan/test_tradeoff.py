@@ -120,4 +120,3 @@ def test_more_steps_cost_more_operations_and_come_nearer():
     few, many, most = (traced(scene, field, pixels, "straight", n, 1) for n in (16, 64, 256))
     assert few.operations < many.operations < most.operations
     assert many.off_px(most) < few.off_px(most)
-    assert most.off_px(most) == 0.0

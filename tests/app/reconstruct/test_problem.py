@@ -37,7 +37,7 @@ def captured(folder, data_term, *, moved_px=0, known=(INLET,)):
     flow = still.copy()
     flow[:, 40:88] = np.roll(still, moved_px, axis=1)[:, 40:88]
     for role, view in (("reference", still), ("flow", flow)):
-        burst = run_capture(SimulatedCamera(lambda view=view: view, seed=1), CapturePlan(kind=role, frames=2))
+        burst = run_capture(SimulatedCamera(lambda view=view: view, seed=1), CapturePlan(role=role, frames=2))
         write_capture(experiment.captures_folder / f"1-{role}", burst)
     return experiment
 

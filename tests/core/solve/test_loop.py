@@ -11,10 +11,11 @@ import numpy as np
 import optax
 import pytest
 
+from core.checkpoint import decode, encode, newest
 from core.result import Outcome
 from core.setting import SettingError
-from core.solve.checkpoint import decode, encode, newest
 from core.solve.loop import LoopSettings, LoopState, run
+from core.watch import StoppedError, Watch
 from tests.core.solve.memory import Memory
 
 
@@ -57,8 +58,12 @@ def test_the_step_is_traced_once_for_a_whole_run():
 def test_a_resumed_run_is_bitwise_the_uninterrupted_one():
     whole = solve(LoopSettings(steps=60, record_every=10))
     store = Memory()
-    solve(LoopSettings(steps=60, checkpoint_every_steps=25), store=store, should_stop=_after(31))
-    resumed = solve(LoopSettings(steps=60, record_every=10), store=store)
+    with pytest.raises(StoppedError):
+        solve(
+            LoopSettings(steps=60, checkpoint_every_steps=25),
+            watch=Watch(store=store, should_stop=_after(31)),
+        )
+    resumed = solve(LoopSettings(steps=60, record_every=10), watch=Watch(store=store))
     np.testing.assert_array_equal(whole.last, resumed.last)
     np.testing.assert_array_equal(whole.best, resumed.best)
     assert whole.history[-1]["loss"] == resumed.history[-1]["loss"]
@@ -72,31 +77,32 @@ def _after(calls):
 def test_a_stop_request_leaves_a_checkpoint_of_that_very_step():
     # Asked for by step, not by call: a slow machine calls `should_stop` while it waits for a step, too.
     store, done = Memory(), []
-    found = solve(
-        LoopSettings(steps=60, record_every=1),
-        store=store,
-        on_event=lambda event: done.append(event["step"]) if event["kind"] == "progress" else None,
-        should_stop=lambda: len(done) >= 12,
+    watch = Watch(
+        lambda row, growing: done.append(row["step"]) if "step" in row else None,
+        lambda: len(done) >= 12,
+        store,
     )
-    assert found.outcome is Outcome.stopped
+    with pytest.raises(StoppedError):
+        solve(LoopSettings(steps=60, record_every=1), watch=watch)
     assert newest(store).header["step"] == done[-1] == 12
 
 
 def test_a_torn_checkpoint_gives_way_to_the_one_before():
     store = Memory()
-    solve(LoopSettings(steps=20, checkpoint_every_steps=5), store=store)
-    store.kept[0] = store.kept[0][:-3]
+    solve(LoopSettings(steps=20, checkpoint_every_steps=5), watch=Watch(store=store))
+    before, last = sorted(name for name in store if name.isdigit())
+    store[last] = store[last][:-3]
     assert newest(store).header["step"] == 15
-    store.kept = store.kept[:1]
+    del store[before]
     with pytest.raises(SettingError, match="sha256"):
         newest(store)
 
 
 def test_a_checkpoint_of_another_configuration_is_refused():
     store = Memory()
-    solve(LoopSettings(steps=10, checkpoint_every_steps=5), store=store)
+    solve(LoopSettings(steps=10, checkpoint_every_steps=5), watch=Watch(store=store))
     with pytest.raises(SettingError, match="were changed"):
-        solve(LoopSettings(steps=10), store=store, configuration="b")
+        solve(LoopSettings(steps=10), watch=Watch(store=store), configuration="b")
 
 
 def test_checkpoints_have_no_pickle_and_say_what_they_are():
@@ -125,10 +131,13 @@ def test_a_plateau_and_a_time_limit_end_a_run_by_name():
 
 
 def test_too_little_memory_is_refused_before_the_first_step():
-    events = []
+    rows = []
     with pytest.raises(SettingError, match="smaller batches"):
-        solve(LoopSettings(steps=5, memory_limit_bytes=10), on_event=events.append)
-    assert [e["kind"] for e in events] == ["start"]
+        solve(
+            LoopSettings(steps=5, memory_limit_bytes=10), watch=Watch(lambda row, growing: rows.append(row))
+        )
+    assert [row["doing"] for row in rows] == ["compiled"]
+    assert rows[0]["memory_bytes"] > 10
 
 
 SCRIPT = """
@@ -136,23 +145,14 @@ import sys
 from pathlib import Path
 import numpy as np
 import time
+from app.jobs.checkpoints import FolderStore
+from core.watch import Watch
 from tests.core.solve.test_loop import LoopSettings, solve
 
-class Folder:
-    def __init__(self, path):
-        self.path = path
-    def save(self, content):
-        temporary = self.path / "new.tmp"
-        temporary.write_bytes(content)
-        temporary.replace(self.path / "checkpoint")
-    def load(self):
-        file = self.path / "checkpoint"
-        return [file.read_bytes()] if file.exists() else []
-
 folder = Path(sys.argv[1])
-slow = lambda event: time.sleep(0.01 if event["kind"] == "progress" else 0)
+slow = lambda row, growing: time.sleep(0.01 if "step" in row else 0)
 settings = LoopSettings(steps=400, record_every=1, checkpoint_every_steps=20)
-found = solve(settings, store=Folder(folder), on_event=slow)
+found = solve(settings, watch=Watch(slow, store=FolderStore(folder)))
 np.save(folder / "end.npy", np.stack([found.last, found.best]))
 """
 
@@ -163,12 +163,12 @@ def test_kill_9_in_the_middle_and_again_ends_bitwise_the_same(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(root)}
     with subprocess.Popen(command, env=environment, cwd=root) as process:
         deadline = time.monotonic() + 120
-        while not (tmp_path / "checkpoint").exists() and time.monotonic() < deadline:
+        while not list(tmp_path.glob("0*.checkpoint")) and time.monotonic() < deadline:
             time.sleep(0.01)
         process.send_signal(signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL
     assert not (tmp_path / "end.npy").exists()
-    step = decode((tmp_path / "checkpoint").read_bytes()).header["step"]
+    step = decode(sorted(tmp_path.glob("0*.checkpoint"))[-1].read_bytes()).header["step"]
     assert 0 < step < 400
 
     subprocess.run(command, env=environment, cwd=root, check=True)

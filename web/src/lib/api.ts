@@ -3,7 +3,11 @@
 import type { paths, Problem as Told } from "./schema";
 
 /** What the page needs of a refusal; what lies beyond the service has no more. */
-export type Problem = Pick<Told, "code" | "title" | "detail" | "status" | "current">;
+export type Problem = Pick<Told, "code" | "title" | "detail" | "status"> & {
+  /** Where somebody else changed it meanwhile: how it stands, and what was sent. */
+  current?: Record<string, unknown> | null;
+  sent?: Record<string, unknown> | null;
+};
 
 export class ProblemError extends Error {
   constructor(readonly problem: Problem) {
@@ -42,15 +46,14 @@ export type Body<R extends Request> =
 export type Answer<R extends Request> = Content<Good<Operation<R>>>;
 type Content<A> = [A] extends [never] ? undefined : A extends { content: { "application/json": infer T } } ? T : never;
 
-/** Sends a request and returns its answer; with a revision, only while nobody else changed the resource.
-    Throws a ProblemError. */
+/** Sends a request and returns its answer; a change may name the revision it is made to. Throws a ProblemError. */
 export async function ask<R extends Request>(
   request: R,
   given: Given<R>,
   body?: Body<R>,
-  revision?: string,
+  revision?: string | null,
 ): Promise<Answer<R>> {
-  const headers: Record<string, string> = revision === undefined ? {} : { "If-Match": `"${revision}"` };
+  const headers: Record<string, string> = revision ? { "If-Match": `"${revision}"` } : {};
   const answer = await reach(verbOf(request), address(request, given), body, headers);
   return (answer.status === 204 ? undefined : await answer.json()) as Answer<R>;
 }

@@ -16,6 +16,8 @@ import type {
 export const PAGES = ["Rig", "Calibrate", "Plan", "Capture", "Reconstruct", "Look"] as const;
 export type Page = (typeof PAGES)[number];
 
+// So many pixels across see the packaged room's 9.7 K in single windows; 384 would take 7400 frames.
+const SIMULATED_PX = 1536;
 const ACTIVE = ["queued", "running", "pausing", "cancelling", "lost"];
 
 export type Action = Given<"POST /jobs/{job}/{action}">["action"];
@@ -42,12 +44,19 @@ class Bench {
   result = $state<string | null>(null);
   problem = $state.raw<Problem | null>(null);
   working = $state<string | null>(null);
+  /** True once the first answers are there: from then on the address follows the page. */
+  opened = $state(false);
+  /** How the next reconstruction is solved. */
+  preset = $state("auto");
+  /** What each running job says that it does. */
+  stages = $state.raw<Record<string, string>>({});
   done = $state("");
   /** Grows with everything that is told of a guided calibration. */
   guided = $state(0);
 
   private stream: EventSource | null = null;
   private pending = new Set<string>();
+  private again: (() => Promise<unknown>) | null = null;
 
   /** The experiment that actions are about. */
   get here(): string {
@@ -56,14 +65,20 @@ class Bench {
 
   current = $derived(this.experiments.find((one) => one.experiment === this.experiment) ?? null);
   active = $derived(this.jobs.filter((job) => ACTIVE.includes(job.state)));
+  /** The camera and the projector, where they are connected for this experiment. */
+  ownCamera = $derived(this.camera?.experiment === this.experiment ? this.camera : null);
+  ownProjector = $derived(this.projector?.experiment === this.experiment ? this.projector : null);
+  ownDesk = $derived(this.desk?.experiment === this.experiment ? this.desk : null);
   finished = $derived(this.captures.filter((one) => one.state === "finished"));
   next = $derived.by(() => this.nextStep());
 
   async start(): Promise<void> {
     await this.attempt("Opening", async () => {
       await openSession();
+      this.read(location.hash);
       await this.refresh();
       this.listen();
+      this.opened = true;
     });
     if (!this.stream) setTimeout(() => void this.start(), 2000);
   }
@@ -84,6 +99,28 @@ class Bench {
     } finally {
       this.working = null;
     }
+  }
+
+  /** Makes a change to what was read at `revision`. Where somebody else's came before, `settle` ends it. */
+  async change<T>(what: string, revision: string, send: (revision: string | null) => Promise<T>): Promise<void> {
+    await this.attempt(what, async () => {
+      try {
+        await send(revision);
+      } catch (error) {
+        if (error instanceof ProblemError && error.problem.code === "changed") this.again = () => send(null);
+        throw error;
+      }
+    });
+  }
+
+  /** Sends the refused change again, to whatever is there, or leaves what is there. */
+  async settle(again: boolean): Promise<void> {
+    const send = this.again;
+    [this.again, this.problem] = [null, null];
+    await this.attempt("Settling", async () => {
+      if (again && send) await send();
+      await this.refresh();
+    });
   }
 
   async refresh(): Promise<void> {
@@ -109,17 +146,42 @@ class Bench {
   async refreshExperiment(): Promise<void> {
     if (!this.experiment) return;
     const here = { experiment: this.experiment };
-    [this.captures, this.results] = await Promise.all([
+    const [captures, results] = await Promise.all([
       ask("GET /experiments/{experiment}/captures", here),
       ask("GET /experiments/{experiment}/results", here),
     ]);
+    // An answer about an experiment that is no longer open is not shown.
+    if (here.experiment !== this.experiment) return;
+    [this.captures, this.results] = [captures, results];
     const finished = this.results.filter((one) => one.state === "finished");
     if (!finished.some((one) => one.result === this.result)) this.result = finished[0]?.result ?? null;
   }
 
-  async choose(experiment: string): Promise<void> {
+  /** Where the page is, as the part of its address after the #: page, experiment, and on Look the result. */
+  get place(): string {
+    const parts = [this.page.toLowerCase(), this.experiment, this.page === "Look" ? this.result : null];
+    return `#/${parts.flatMap((part) => (part ? [encodeURIComponent(part)] : [])).join("/")}`;
+  }
+
+  /** Goes to an address that `place` gave. */
+  async go(hash: string): Promise<void> {
+    const before = this.experiment;
+    this.read(hash);
+    if (this.experiment && this.experiment !== before) await this.choose(this.experiment, this.result);
+  }
+
+  private read(hash: string): void {
+    const [page, experiment, result] = hash.replace(/^#\/?/, "").split("/").map(decodeURIComponent);
+    const found = PAGES.find((one) => one.toLowerCase() === page);
+    if (!found) return;
+    this.page = found;
+    if (experiment) this.experiment = experiment;
+    if (result) this.result = result;
+  }
+
+  async choose(experiment: string, result: string | null = null): Promise<void> {
     this.experiment = experiment;
-    this.result = null;
+    [this.captures, this.results, this.result] = [[], [], result];
     await this.attempt("Opening", () => this.refreshExperiment());
   }
 
@@ -127,7 +189,7 @@ class Bench {
 
   async createSimulated(light: "texture" | "projector" = "texture"): Promise<void> {
     const title = light === "texture" ? "Simulated room" : "Simulated room, projected light";
-    const made = await ask("POST /experiments", {}, { kind: "simulated", title, light });
+    const made = await ask("POST /experiments", {}, { kind: "simulated", title, light, camera_px: SIMULATED_PX });
     this.experiment = made.experiment;
     await this.connect();
     await this.refresh();
@@ -178,7 +240,7 @@ class Bench {
       {
         kind: "reconstruct",
         experiment: this.here,
-        title: `${preset}: ${this.current?.title ?? this.experiment}`,
+        title: `Reconstruct (${preset}): ${this.current?.title ?? this.experiment}`,
         settings: { preset },
         key: crypto.randomUUID(),
       },
@@ -213,15 +275,17 @@ class Bench {
   }
 
   private nextStep(): Step {
-    const running = this.desk?.state === "running";
+    const running = this.ownDesk?.state === "running";
     const job = this.active.find((one) => one.experiment === this.experiment);
     const has = (role: string) => this.finished.some((one) => one.role === role);
     const step = (label: string, page: Page, act: () => Promise<unknown>, busy = false) => ({ label, page, act, busy });
     const nothing = () => Promise.resolve();
     if (!this.experiment) return step("Start a simulated rig", "Rig", () => this.createSimulated());
-    if (this.camera?.state === "failed") return step("Reconnect the camera", "Rig", () => this.connect());
+    const needsCamera = ["Rig", "Calibrate", "Capture"].includes(this.page);
+    if (needsCamera && this.ownCamera?.state === "failed")
+      return step("Reconnect the camera", "Rig", () => this.connect());
     if (running) {
-      const { role, done, total } = this.desk!;
+      const { role, done, total } = this.ownDesk!;
       return step(`Taking the ${role}: ${done} of ${total}`, "Capture", nothing, true);
     }
     if (!this.current?.calibrated) {
@@ -233,11 +297,14 @@ class Bench {
     }
     if (!has("reference")) return step("Take the reference", "Capture", () => this.capture("reference", 100));
     if (!has("flow")) return step("Take the flow", "Capture", () => this.capture("flow", 100));
-    if (job) return step(`Reconstructing: ${Math.round(100 * job.progress)} %`, "Reconstruct", nothing, true);
-    const last = this.jobs.find((one) => one.experiment === this.experiment);
+    if (job) {
+      const share = job.steps ? `: ${Math.round(100 * job.progress)} %` : " …";
+      return step(`${job.kind === "plan" ? "Planning" : "Reconstructing"}${share}`, "Reconstruct", nothing, true);
+    }
+    const last = this.jobs.find((one) => one.experiment === this.experiment && one.kind === "reconstruct");
     if (!this.result && last && ["failed", "cancelled"].includes(last.state))
       return step("Retry the reconstruction", "Reconstruct", () => this.act(last, "retry"));
-    if (!this.result) return step("Reconstruct a draft", "Reconstruct", () => this.reconstruct("draft"));
+    if (!this.result) return step("Reconstruct", "Reconstruct", () => this.reconstruct(this.preset));
     if (this.page !== "Look") return step("Look at the result", "Look", nothing);
     return step("Export NetCDF", "Look", () => this.export("nc"));
   }
@@ -285,7 +352,8 @@ class Bench {
   }
 
   private progress(event: EventResource): void {
-    const { step, steps } = event.body;
+    const { step, steps, stage } = event.body;
+    if (event.job && typeof stage === "string") this.stages = { ...this.stages, [event.job]: stage };
     if (typeof step !== "number" || typeof steps !== "number") return;
     const progress = steps > 0 ? Math.min(1, step / steps) : 0;
     this.jobs = this.jobs.map((job) => (job.job === event.job ? { ...job, step, steps, progress } : job));

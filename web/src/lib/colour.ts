@@ -30,26 +30,36 @@ const PUOR: readonly Stop[] = [
   [127, 59, 8],
 ];
 
+// Light throughout, for lines on a dark ground: blue, green, yellow, orange.
+const LIGHT: readonly Stop[] = [
+  [102, 178, 255],
+  [120, 220, 190],
+  [230, 235, 120],
+  [255, 190, 80],
+  [255, 120, 70],
+];
+const STOPS = { rising: CIVIDIS, signed: PUOR, light: LIGHT };
+
 export interface Scale {
   low: number;
   high: number;
-  signed: boolean;
+  kind: keyof typeof STOPS;
 }
 
 /** A scale for values between two bounds: symmetric about zero where the quantity has a sign. */
 export function scaleFor(name: string, low: number, high: number): Scale {
-  const signed = /^[uvwp](_truth)?$|_error$|_difference$/.test(name);
   const reach = Math.max(Math.abs(low), Math.abs(high)) || 1;
-  return signed ? { low: -reach, high: reach, signed } : { low, high: high > low ? high : low + 1e-6, signed };
+  if (/^[uvwp](_truth)?$|_error$|_difference$/.test(name)) return { low: -reach, high: reach, kind: "signed" };
+  return { low, high: high > low ? high : low + 1e-6, kind: "rising" };
 }
 
-export function stops(signed: boolean): readonly Stop[] {
-  return signed ? PUOR : CIVIDIS;
+export function stops(kind: Scale["kind"]): readonly Stop[] {
+  return STOPS[kind];
 }
 
 /** 256 colours as RGB triples. */
-export function table(signed: boolean): Uint8ClampedArray {
-  const anchors = stops(signed);
+export function table(kind: Scale["kind"]): Uint8ClampedArray {
+  const anchors = stops(kind);
   const colours = new Uint8ClampedArray(256 * 3);
   for (let i = 0; i < 256; i++) {
     const at = (i / 255) * (anchors.length - 1);
@@ -63,7 +73,7 @@ export function table(signed: boolean): Uint8ClampedArray {
 /** Paints a plane: the first index to the right, the second upwards. */
 export function paint(values: Float32Array, shape: number[], scale: Scale): ImageData {
   const [across, up] = [shape[0] ?? 1, shape[1] ?? 1];
-  const colours = table(scale.signed);
+  const colours = table(scale.kind);
   const image = new ImageData(across, up);
   const factor = 255 / (scale.high - scale.low);
   for (let i = 0; i < across; i++)

@@ -28,7 +28,7 @@ class Planned {
       {
         kind: "plan",
         experiment: bench.here,
-        title: `plan: ${bench.current?.title ?? bench.experiment}`,
+        title: `Plan: ${bench.current?.title ?? bench.experiment}`,
         settings: excess_k === null ? {} : { excess_k },
         key: crypto.randomUUID(),
       },
@@ -42,8 +42,3 @@ class Planned {
 }
 
 export const planned = new Planned();
-
-export function duration(seconds: number): string {
-  if (seconds < 90) return `${Math.max(1, Math.round(seconds))} s`;
-  return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${(seconds / 3600).toFixed(1)} h`;
-}

@@ -1,3 +1,5 @@
+import { curveName } from "./words";
+
 // Nested settings as flat lines, so that two results can be told apart line by line.
 
 /** Every leaf by its path: `settings.scene.room.upper_m.0` -> 4. */
@@ -32,7 +34,7 @@ export function together(histories: Record<string, Record<string, number | null>
     rows.forEach((row, index) => {
       for (const [name, value] of Object.entries(row)) {
         if (skipped.includes(name)) continue;
-        const line = (values[`${name}, ${label}`] ??= step.map(() => null));
+        const line = (values[`${curveName(name)}, ${label}`] ??= step.map(() => null));
         line[at.get(stepOf(row, index))!] = value;
       }
     });

@@ -18,18 +18,32 @@ import vtkVolumeMapper from "@kitware/vtk.js/Rendering/Core/VolumeMapper";
 import vtkGenericRenderWindow from "@kitware/vtk.js/Rendering/Misc/GenericRenderWindow";
 import type { Numbers } from "./api";
 import { stops, type Scale } from "./colour";
-import { arrows, streamlines, type Grid, type Lines } from "./flow";
+import { arrows, speedLimit, streamlines, Strokes, type Grid, type Lines } from "./flow";
+import type { Opening, Vector } from "./room";
+import { ticksOf } from "./ticks";
 
 export interface Modes {
+  plane: boolean;
   volume: boolean;
   surface: boolean;
   arrows: boolean;
   streamlines: boolean;
 }
 
+export const VIEWS = {
+  Corner: [-0.55, -1, 0.45],
+  Front: [0, -1, 0],
+  Side: [1, 0, 0],
+  Top: [0, -0.001, 1],
+} as const;
+
 export interface Scene3d {
-  load(values: Numbers, velocity: Numbers[] | null, axes: Grid["axes"], scale: Scale): void;
-  show(modes: Modes, level: number): void;
+  /** Takes what is shown; the fastest speed [m/s] is given back where velocity is known. */
+  load(values: Numbers, velocity: Numbers[] | null, axes: Grid["axes"], scale: Scale, openings: Opening[]): number;
+  /** `level` and `at` are shares: of the scale for the isosurface, of the room's depth for the plane. */
+  show(modes: Modes, level: number, at: number): void;
+  look(from: keyof typeof VIEWS): void;
+  move(on: boolean): void;
   picture(): Promise<string>;
   close(): void;
 }
@@ -37,13 +51,21 @@ export interface Scene3d {
 // Voxels from sample to sample along a ray, finest first; the first that is fast enough is kept.
 const STRIDES = [1.5, 2.2, 3.2] as const;
 const SMOOTH_MS = 90;
+// Room air crosses a room in half a minute: shown so many times as fast, each stroke as long as it goes in this time.
+const FASTER = 4;
+const TAIL_S = 1.5;
+const FRAME_MS = 40;
+const OPENINGS = { inlet: [0.45, 0.85, 1], outlet: [1, 0.75, 0.4], heater: [1, 0.45, 0.4] } as const;
 
 export function createScene(place: HTMLElement): Scene3d {
   const view = vtkGenericRenderWindow.newInstance({ background: [0.08, 0.09, 0.11], listenWindowResize: false });
   view.setContainer(place as HTMLDivElement);
   const renderer = view.getRenderer();
   const window3d = view.getRenderWindow();
-  const watch = new ResizeObserver(() => view.resize());
+  const watch = new ResizeObserver(() => {
+    view.resize();
+    marks.put();
+  });
   watch.observe(place);
   view.resize();
 
@@ -53,49 +75,79 @@ export function createScene(place: HTMLElement): Scene3d {
   const cubes = vtkImageMarchingCubes.newInstance({ computeNormals: true, mergePoints: true });
   const surface = actorOf(cubes.getOutputPort());
   surface.getProperty().setOpacity(0.7);
-  const arrowActor = vtkActor.newInstance();
-  const lineActor = vtkActor.newInstance();
-  for (const actor of [arrowActor, lineActor]) actor.getProperty().setLineWidth(2);
+  const [planeActor, arrowActor, lineActor, strokeActor] = [0, 1, 2, 3].map(() => vtkActor.newInstance()) as Actor[];
+  planeActor!.getProperty().setLighting(false);
+  arrowActor!.getProperty().setLineWidth(2);
+  lineActor!.getProperty().setLineWidth(1.5);
+  strokeActor!.getProperty().setLineWidth(4);
   const outline = vtkOutlineFilter.newInstance();
   const frame = actorOf(outline.getOutputPort());
   frame.getProperty().setColor(0.6, 0.65, 0.7);
-  let scale: Scale = { low: 0, high: 1, signed: false };
-  let loaded = false;
+  const marks = new Marks(place, (at) => {
+    const { width, height } = place.getBoundingClientRect();
+    const [x = 0, y = 0] = renderer.worldToNormalizedDisplay(at[0], at[1], at[2], width / Math.max(1, height));
+    return [x * width, (1 - y) * height];
+  });
+  let walls: Actor[] = [];
+  let scale: Scale = { low: 0, high: 1, kind: "rising" };
+  let shown: { values: Numbers; axes: Grid["axes"] } | null = null;
+  let strokes: Strokes | null = null;
   let stride = 0;
   let voxel_m = 1;
+  let timer = 0;
 
-  function load(values: Numbers, velocity: Numbers[] | null, axes: Grid["axes"], wanted: Scale): void {
+  function load(
+    values: Numbers,
+    velocity: Numbers[] | null,
+    axes: Grid["axes"],
+    wanted: Scale,
+    openings: Opening[],
+  ): number {
     scale = wanted;
     const image = imageOf(values, axes);
-    const colours = colourFunction(scale);
     volumeMapper.setInputData(image);
     voxel_m = Math.min(...image.getSpacing());
     volumeMapper.setSampleDistance((stride || STRIDES[0]) * voxel_m);
-    volume.getProperty().setRGBTransferFunction(0, colours);
+    volume.getProperty().setRGBTransferFunction(0, colourFunction(scale));
     volume.getProperty().setScalarOpacity(0, opacityFunction(scale));
     volume.getProperty().setInterpolationTypeToLinear();
     cubes.setInputData(image);
     outline.setInputData(image);
-    if (velocity) {
-      const grid: Grid = { axes, u: velocity[0]!, v: velocity[1]!, w: velocity[2]! };
-      arrowActor.setMapper(mapperOf(arrows(grid)));
-      lineActor.setMapper(mapperOf(streamlines(grid)));
-    }
+    const fastest = velocity ? flow({ axes, u: velocity[0]!, v: velocity[1]!, w: velocity[2]! }) : 0;
+    planeActor!.setMapper(planeMapper(values, axes, 0.5, scale));
+    walls = openings.map(openingOf);
     renderer.removeAllViewProps();
     renderer.addVolume(volume);
-    for (const actor of [surface, arrowActor, lineActor, frame]) if (actor.getMapper()) renderer.addActor(actor);
-    if (!loaded) lookFrom(renderer.getActiveCamera(), image.getCenter());
-    if (!loaded) renderer.resetCamera();
-    if (!loaded) renderer.getActiveCamera().zoom(1.1);
-    loaded = true;
+    // An actor that has nothing to draw yet cannot be rendered.
+    for (const actor of [planeActor!, surface, arrowActor!, lineActor!, strokeActor!, frame, ...walls])
+      if (actor.getMapper()) renderer.addActor(actor);
+    marks.set([...axisMarks(axes), ...openings.map((one) => ({ text: one.label, at: middleOf(one.corners) }))]);
+    const isFirst = shown === null;
+    shown = { values, axes };
+    if (isFirst) look("Corner");
+    return fastest;
   }
 
-  function show(modes: Modes, level: number): void {
-    if (!loaded) return;
+  function flow(grid: Grid): number {
+    const fastest = speedLimit(grid);
+    const lines = streamlines(grid);
+    strokes = new Strokes(lines, TAIL_S);
+    strokes.move(0);
+    arrowActor!.setMapper(linesMapper(linesData(arrows(grid)), fastest));
+    lineActor!.setMapper(linesMapper(linesData(lines), fastest));
+    strokeActor!.setMapper(linesMapper(linesData(strokes.lines), fastest));
+    return fastest;
+  }
+
+  function show(modes: Modes, level: number, at: number): void {
+    if (!shown) return;
+    if (modes.plane) planeActor!.setMapper(planeMapper(shown.values, shown.axes, at, scale));
+    planeActor!.setVisibility(modes.plane);
     volume.setVisibility(modes.volume);
     surface.setVisibility(modes.surface);
-    arrowActor.setVisibility(modes.arrows);
-    lineActor.setVisibility(modes.streamlines);
+    arrowActor!.setVisibility(modes.arrows && strokes !== null);
+    lineActor!.setVisibility(modes.streamlines && strokes !== null);
+    strokeActor!.setVisibility(modes.streamlines && strokes !== null);
     const value = scale.low + level * (scale.high - scale.low);
     if (modes.surface) cubes.setContourValue(value);
     const colour: number[] = [0, 0, 0];
@@ -104,7 +156,41 @@ export function createScene(place: HTMLElement): Scene3d {
     if (!stride && modes.volume) pace();
     const began_ms = performance.now();
     window3d.render();
+    marks.put();
     place.dataset["frameMs"] = (performance.now() - began_ms).toFixed(1);
+  }
+
+  function look(from: keyof typeof VIEWS): void {
+    const camera = renderer.getActiveCamera();
+    const [x, y, z] = outline.getOutputData().getCenter() as Vector;
+    const [dx, dy, dz] = VIEWS[from];
+    camera.setFocalPoint(x, y, z);
+    camera.setPosition(x + dx, y + dy, z + dz);
+    camera.setViewUp(0, 0, 1);
+    renderer.resetCamera();
+    camera.zoom(from === "Corner" ? 1 : 1.1);
+    renderer.resetCameraClippingRange();
+    window3d.render();
+    marks.put();
+  }
+
+  function move(on: boolean): void {
+    clearTimeout(timer);
+    if (on) step();
+  }
+
+  function step(): void {
+    const began_ms = performance.now();
+    const data = strokeActor!.getMapper()?.getInputData() as ReturnType<typeof linesData> | undefined;
+    if (strokes && data && strokeActor!.getVisibility() && !document.hidden) {
+      strokes.move((FASTER * began_ms) / 1000);
+      data.getPoints().modified();
+      data.modified();
+      window3d.render();
+      place.dataset["moved"] = String(Number(place.dataset["moved"] ?? 0) + 1);
+    }
+    // What drawing takes is left free for everything else.
+    timer = window.setTimeout(step, Math.max(FRAME_MS, performance.now() - began_ms));
   }
 
   /** Choose the finest stride that this machine draws smoothly: without a graphics card a frame costs as much as its samples. */
@@ -131,24 +217,112 @@ export function createScene(place: HTMLElement): Scene3d {
   }
 
   function close(): void {
+    clearTimeout(timer);
     watch.disconnect();
+    turning.unsubscribe();
+    marks.set([]);
     view.delete();
   }
 
-  return { load, show, picture, close };
+  const turning = renderer.getActiveCamera().onModified(() => marks.put());
+  return { load, show, look, move, picture, close };
 }
 
-/** From the front, a little to the left and above; z points upwards. */
-function lookFrom(
-  camera: ReturnType<
-    ReturnType<ReturnType<typeof vtkGenericRenderWindow.newInstance>["getRenderer"]>["getActiveCamera"]
-  >,
-  centre: number[],
-) {
-  const [x = 0, y = 0, z = 0] = centre;
-  camera.setFocalPoint(x, y, z);
-  camera.setPosition(x - 0.55, y - 1, z + 0.45);
-  camera.setViewUp(0, 0, 1);
+type Actor = ReturnType<typeof vtkActor.newInstance>;
+
+interface Mark {
+  text: string;
+  at: Vector;
+}
+
+/** Words over the picture that stay at their places in the room. */
+class Marks {
+  private kept: { mark: Mark; element: HTMLElement }[] = [];
+
+  constructor(
+    private readonly place: HTMLElement,
+    private readonly seen: (at: Vector) => [number, number],
+  ) {}
+
+  set(marks: Mark[]): void {
+    for (const one of this.kept) one.element.remove();
+    this.kept = marks.map((mark) => {
+      const element = document.createElement("span");
+      element.className = "mark";
+      element.textContent = mark.text;
+      this.place.append(element);
+      return { mark, element };
+    });
+  }
+
+  put(): void {
+    for (const { mark, element } of this.kept) {
+      const [left, top] = this.seen(mark.at);
+      element.style.transform = `translate(-50%, -50%) translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
+    }
+  }
+}
+
+/** Metres along three edges of the room that meet in a lower corner. */
+function axisMarks(axes: Grid["axes"]): Mark[] {
+  const [x, y, z] = [axes.x, axes.y, axes.z];
+  const [left, right, front, floor] = [x[0] ?? 0, x.at(-1) ?? 1, y[0] ?? 0, z[0] ?? 0];
+  const off = 0.06 * (right - left);
+  const last = (places: number[]) => ((places.at(-1) ?? 1) + (places[0] ?? 0)) / 2;
+  return [
+    ...ticksOf(x).map((one) => ({ text: one.label, at: [one.value, front - off, floor - off] as Vector })),
+    ...ticksOf(y).map((one) => ({ text: one.label, at: [right + off, one.value, floor - off] as Vector })),
+    ...ticksOf(z).map((one) => ({ text: one.label, at: [left - off, front - off, one.value] as Vector })),
+    { text: "x [m]", at: [last(x), front - 2.6 * off, floor - 2.6 * off] },
+    { text: "y [m]", at: [right + 2.6 * off, last(y), floor - 2.6 * off] },
+    { text: "z [m]", at: [left - 2.8 * off, front - 2.8 * off, last(z)] },
+  ];
+}
+
+const middleOf = (corners: Vector[]) =>
+  [0, 1, 2].map((a) => corners.reduce((sum, corner) => sum + corner[a]! / corners.length, 0)) as Vector;
+
+function openingOf(one: Opening): Actor {
+  const data = vtkPolyData.newInstance();
+  const points = vtkPoints.newInstance();
+  points.setData(Float32Array.from(one.corners.flat()), 3);
+  data.setPoints(points);
+  data.setPolys(vtkCellArray.newInstance({ values: Uint32Array.from([4, 0, 1, 2, 3]) }));
+  data.setLines(vtkCellArray.newInstance({ values: Uint32Array.from([5, 0, 1, 2, 3, 0]) }));
+  const mapper = vtkMapper.newInstance({ scalarVisibility: false });
+  mapper.setInputData(data);
+  const actor = vtkActor.newInstance();
+  actor.setMapper(mapper);
+  const [r, g, b] = OPENINGS[one.kind];
+  actor.getProperty().setColor(r, g, b);
+  actor.getProperty().setLighting(false);
+  actor.getProperty().setLineWidth(3);
+  return actor;
+}
+
+/** The vertices of one plane across y as a surface, coloured at each vertex. */
+function planeMapper(values: Numbers, axes: Grid["axes"], at: number, scale: Scale) {
+  const [nx = 1, ny = 1, nz = 1] = values.shape;
+  const j = Math.round(at * (ny - 1));
+  const [places, colours, cells] = [new Float32Array(3 * nx * nz), new Float32Array(nx * nz), [] as number[]];
+  for (let i = 0; i < nx; i++)
+    for (let k = 0; k < nz; k++) {
+      const n = i * nz + k;
+      places.set([axes.x[i] ?? 0, axes.y[j] ?? 0, axes.z[k] ?? 0], 3 * n);
+      colours[n] = values.values[(i * ny + j) * nz + k]!;
+      if (i + 1 < nx && k + 1 < nz) cells.push(4, n, n + nz, n + nz + 1, n + 1);
+    }
+  const data = vtkPolyData.newInstance();
+  const points = vtkPoints.newInstance();
+  points.setData(places, 3);
+  data.setPoints(points);
+  data.setPolys(vtkCellArray.newInstance({ values: Uint32Array.from(cells) }));
+  data.getPointData().setScalars(vtkDataArray.newInstance({ name: "field", values: colours }));
+  const mapper = vtkMapper.newInstance({ scalarVisibility: true, interpolateScalarsBeforeMapping: true });
+  mapper.setLookupTable(colourFunction(scale));
+  mapper.setScalarRange(scale.low, scale.high);
+  mapper.setInputData(data);
+  return mapper;
 }
 
 function imageOf(values: Numbers, axes: Grid["axes"]) {
@@ -169,7 +343,7 @@ function imageOf(values: Numbers, axes: Grid["axes"]) {
 
 function colourFunction(scale: Scale) {
   const colours = vtkColorTransferFunction.newInstance();
-  const anchors = stops(scale.signed);
+  const anchors = stops(scale.kind);
   anchors.forEach(([r, g, b], index) => {
     const at = scale.low + (index / (anchors.length - 1)) * (scale.high - scale.low);
     colours.addRGBPoint(at, r / 255, g / 255, b / 255);
@@ -180,8 +354,8 @@ function colourFunction(scale: Scale) {
 function opacityFunction(scale: Scale) {
   const opacity = vtkPiecewiseFunction.newInstance();
   const middle = (scale.low + scale.high) / 2;
-  opacity.addPoint(scale.low, scale.signed ? 0.3 : 0);
-  opacity.addPoint(middle, scale.signed ? 0 : 0.04);
+  opacity.addPoint(scale.low, scale.kind === "signed" ? 0.3 : 0);
+  opacity.addPoint(middle, scale.kind === "signed" ? 0 : 0.04);
   opacity.addPoint(scale.high, 0.35);
   return opacity;
 }
@@ -194,16 +368,19 @@ function actorOf(port: ReturnType<ReturnType<typeof vtkOutlineFilter.newInstance
   return actor;
 }
 
-function mapperOf(lines: Lines) {
+function linesData(lines: Lines) {
   const data = vtkPolyData.newInstance();
   const points = vtkPoints.newInstance();
   points.setData(lines.points, 3);
   data.setPoints(points);
   data.setLines(vtkCellArray.newInstance({ values: lines.cells }));
   data.getPointData().setScalars(vtkDataArray.newInstance({ name: "speed", values: lines.speeds }));
-  const fastest = lines.speeds.reduce((most, one) => Math.max(most, one), 1e-9);
+  return data;
+}
+
+function linesMapper(data: ReturnType<typeof linesData>, fastest: number) {
   const mapper = vtkMapper.newInstance({ scalarVisibility: true });
-  mapper.setLookupTable(colourFunction({ low: 0, high: fastest, signed: false }));
+  mapper.setLookupTable(colourFunction({ low: 0, high: fastest, kind: "light" }));
   mapper.setScalarRange(0, fastest);
   mapper.setInputData(data);
   return mapper;

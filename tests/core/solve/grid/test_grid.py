@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
+from core.checkpoint import ForeignCheckpointError, newest
 from core.geometry import Box, looking_along_y
 from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.result import Outcome, Solution
 from core.scene import FixedTexture, PlaneField, Scene, View
 from core.setting import SettingError
-from core.solve.checkpoint import newest
 from core.solve.grid.grid import GridSettings, solve_grid
 from core.solve.regime import Weights
+from core.watch import StoppedError, Watch
 from tests.core.solve.memory import Memory
 
 SETTINGS = GridSettings(cells=8, coarsest=4, steps_a_level=3, cg_iterations=15, settled=0.0)
@@ -54,7 +55,7 @@ def same(a: Solution, b: Solution):
 @pytest.fixture(scope="module")
 def whole():
     events = []
-    solution = solve_grid(problem(), SETTINGS, on_event=events.append)
+    solution = solve_grid(problem(), SETTINGS, Watch(lambda row, growing: events.append(row)))
     assert [e["cells"] for e in events] == [4.0] * 3 + [8.0] * 3
     assert events[-1]["loss_after"] < events[0]["loss"]
     return solution
@@ -64,32 +65,39 @@ def whole():
 @pytest.mark.parametrize("calls", [0, 4, 11], ids=str)
 def test_a_stopped_solve_goes_on_to_bitwise_the_same_end(whole, calls):
     store = Memory()
-    part = solve_grid(problem(), SETTINGS, store=store, should_stop=after(calls))
-    assert part.outcome is Outcome.stopped
-    taken = newest(store).header["step"]
+    with pytest.raises(StoppedError):
+        solve_grid(problem(), SETTINGS, Watch(store=store, should_stop=after(calls)))
+    header = newest(store).header
 
-    resumed = solve_grid(problem(), SETTINGS, store=store)
+    resumed = solve_grid(problem(), SETTINGS, Watch(store=store))
 
-    assert len(part.history) == taken
+    assert len(header["history"]) == header["step"] < 6
     assert len(resumed.history) == 6
     same(resumed, whole)
 
 
 def test_every_step_that_was_kept_leads_to_the_same_end(whole):
     store = Memory()
-    solve_grid(problem(), SETTINGS, store=store)
+    solve_grid(problem(), SETTINGS, Watch(store=store))
     for content in store.kept:
-        other = Memory()
-        other.kept = [content]
-        same(solve_grid(problem(), SETTINGS, store=other), whole)
+        same(solve_grid(problem(), SETTINGS, Watch(store={"00000001": content})), whole)
 
 
 def test_a_checkpoint_of_other_weights_is_refused():
     store = Memory()
-    solve_grid(problem(), SETTINGS, store=store, should_stop=after(0))
+    with pytest.raises(StoppedError):
+        solve_grid(problem(), SETTINGS, Watch(store=store, should_stop=after(0)))
     other = GridSettings(cells=8, coarsest=4, weights=Weights(pde=1.0))
     with pytest.raises(SettingError, match="were changed"):
-        solve_grid(problem(), other, store=store)
+        solve_grid(problem(), other, Watch(store=store))
+
+
+def test_a_checkpoint_of_other_images_is_refused():
+    store = Memory()
+    with pytest.raises(StoppedError):
+        solve_grid(problem(), SETTINGS, Watch(store=store, should_stop=after(0)))
+    with pytest.raises(ForeignCheckpointError, match="were changed"):
+        solve_grid(problem(sensor_std_k=0.25), SETTINGS, Watch(store=store))
 
 
 def test_a_weight_beyond_float32_ends_with_the_last_good_state_and_advice():

@@ -1,0 +1,163 @@
+"""A room's fit that is stopped anywhere goes on to the same bits, and says meanwhile what it does."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.checkpoint import ForeignCheckpointError
+from core.problem import Problem
+from core.result import Solution
+from core.solve.room import RoomSettings, solve_room
+from core.watch import StoppedError, Watch
+from tests.core.solve.test_room import SUPPLY, measured, scene
+
+SETTINGS = RoomSettings(
+    cells=8, coarse_cells=6, vertices=9, settle_s=20.0, restart_s=10.0, refine_s=10.0, final_s=10.0, rounds=2
+)
+
+
+class Asked:
+    """Asks to stop at the n-th question and ever after; counts the questions."""
+
+    def __init__(self, n: float) -> None:
+        self.count, self._n = 0, n
+
+    def __call__(self) -> bool:
+        self.count += 1
+        return self.count > self._n
+
+
+def same(a: Solution, b: Solution) -> None:
+    for name in ("temperature_k", "pressure_m2_s2", "velocity_m_s", "temperature_std_k", "velocity_std_m_s"):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+    assert a.notes == b.notes
+
+
+def timeless(solution: Solution) -> list[dict]:
+    """The history but for the clock."""
+    return [{**row, "elapsed_s": 0.0} for row in solution.history]
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    truth = solve_room(Problem(scene(SUPPLY), ()), SETTINGS)
+    return measured(scene(replace(SUPPLY, temperature_k=305.15)), truth, 1e-5)
+
+
+@pytest.fixture(scope="module")
+def questions() -> Asked:
+    return Asked(float("inf"))
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[dict]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def whole(problem: Problem, questions: Asked, rows: list[dict]) -> Solution:
+    settings = replace(SETTINGS, threads=1)
+    return solve_room(problem, settings, Watch(lambda row, growing: rows.append(dict(row)), questions))
+
+
+def stopped(problem: Problem, store: dict, asked: Asked) -> None:
+    with pytest.raises(StoppedError):
+        solve_room(problem, SETTINGS, Watch(should_stop=asked, store=store))
+
+
+def test_stopped_at_any_chunk_it_goes_on_to_bitwise_the_same_end(
+    problem: Problem, whole: Solution, questions: Asked
+):
+    # At the first question, in the first march, at places all over the fit, and at the last question.
+    for n in [0, 2, *np.linspace(5, questions.count - 2, 7, dtype=int), questions.count - 1]:
+        store: dict[str, bytes] = {}
+        stopped(problem, store, Asked(n))
+        resumed = solve_room(problem, SETTINGS, Watch(store=store))
+        same(resumed, whole)
+        assert timeless(resumed) == timeless(whole)
+
+
+def test_stopped_again_and_again_it_advances_each_time_and_ends_the_same(problem: Problem, whole: Solution):
+    store: dict[str, bytes] = {}
+    watch = None
+    for attempt in itertools.count(1):
+        asked = Asked(25)
+        watch = Watch(should_stop=asked, store=store)
+        try:
+            found = solve_room(problem, replace(SETTINGS, threads=1), watch)
+            break
+        except StoppedError:
+            assert attempt < 60
+    assert attempt > 2
+    same(found, whole)
+
+
+def test_a_march_that_ended_is_never_marched_again(problem: Problem, whole: Solution):
+    store: dict[str, bytes] = {}
+    solve_room(problem, SETTINGS, Watch(store=store))
+    ends = [name for name in store if name.startswith("march-")]
+    assert len(ends) > 10
+    assert not [name for name in store if name.startswith("cut-")]
+
+    # One question a march, and none for chunks.
+    asked = Asked(float("inf"))
+    same(solve_room(problem, SETTINGS, Watch(should_stop=asked, store=store)), whole)
+    assert asked.count == len(ends)
+
+
+def test_a_stop_is_heard_at_the_next_chunk(problem: Problem):
+    asked = Asked(20)
+    stopped(problem, {}, asked)
+    # The one that heard it, and none that would go on; two threads may each hear it once.
+    assert asked.count <= 22
+
+
+def test_what_is_kept_of_other_images_or_settings_is_refused(problem: Problem):
+    store: dict[str, bytes] = {}
+    stopped(problem, store, Asked(3))
+    shift = problem.shifts[0]
+    other = replace(problem, shifts=(replace(shift, displacement_px=2.0 * shift.displacement_px),))
+    with pytest.raises(ForeignCheckpointError, match="were changed"):
+        solve_room(other, SETTINGS, Watch(store=store))
+    with pytest.raises(ForeignCheckpointError, match="were changed"):
+        solve_room(problem, replace(SETTINGS, rounds=3), Watch(store=store))
+    # How many threads march is no matter.
+    stopped(problem, store, Asked(3))
+    with pytest.raises(StoppedError):
+        solve_room(problem, replace(SETTINGS, threads=1), Watch(should_stop=Asked(0), store=store))
+
+
+def test_it_tells_what_it_does_how_much_is_done_and_which_parameters_it_has(
+    whole: Solution, rows: list[dict]
+):
+    assert all(row["doing"] for row in rows)
+    shares = [row["share"] for row in rows]
+    assert shares == sorted(shares)
+    assert 0 < shares[0] < 0.2
+    assert 0.5 < shares[-1] < 1
+    rounds = [row for row in whole.history if "round" in row]
+    assert rounds
+    for row in rounds:
+        assert row["misfit_left"] > 0
+        assert row["elapsed_s"] > 0
+        # Entered 2 K too warm: the fit goes down from 12 K above ambient.
+        assert row["supply 1: temperature above ambient (K)"] < 12.0
+        assert 0.8 < row["supply 1: velocity ratio"] < 1.2
+    assert 0.0 < whole.history[-1]["supply_1_m_s"] < 0.5
+
+
+def test_whoever_watches_sees_the_air_grow(problem: Problem):
+    grown: list[Solution] = []
+
+    def look(row, growing) -> None:
+        if growing is not None and len(grown) < 2:
+            grown.append(growing())
+
+    stopped_at = Watch(look, lambda: len(grown) == 2)
+    with pytest.raises(StoppedError):
+        solve_room(problem, SETTINGS, stopped_at)
+    assert grown[1].temperature_k.shape == (9, 9, 9)
+    assert not np.array_equal(grown[0].temperature_k, grown[1].temperature_k)
+    assert 290.0 < grown[1].temperature_k.mean() < 306.0

@@ -1,0 +1,46 @@
+// What stands in a room, read from its scene: openings and heaters as rectangles.
+
+export type Vector = [number, number, number];
+
+export interface Opening {
+  kind: "inlet" | "outlet" | "heater";
+  corners: Vector[];
+  label: string;
+}
+
+interface Part {
+  kind: string;
+  patch?: { wall: string; lower_m: number[]; upper_m: number[] } | null;
+}
+interface Scene {
+  room: { lower_m: number[]; upper_m: number[] };
+  boundary?: Part[];
+}
+
+const NAMES = { inlet: "supply", outlet: "outlet", heater: "heater" } as const;
+const isNamed = (kind: string): kind is keyof typeof NAMES => kind in NAMES;
+
+/** The openings that the settings of an experiment name; none where there is no scene. */
+export function openingsOf(settings: unknown): Opening[] {
+  const scene = (settings as { scene?: Scene } | undefined)?.scene;
+  if (!scene) return [];
+  const parts = (scene.boundary ?? []).filter((one) => one.patch && isNamed(one.kind));
+  return parts.map((one) => {
+    const kind = one.kind as Opening["kind"];
+    const alike = parts.filter((other) => other.kind === kind);
+    const number = alike.length > 1 ? ` ${alike.indexOf(one) + 1}` : "";
+    return { kind, label: `${NAMES[kind]}${number}`, corners: cornersOf(one.patch!, scene.room) };
+  });
+}
+
+/** The four corners of a rectangle on a wall; its bounds go along the wall's two axes in the order x, y, z. */
+function cornersOf(patch: NonNullable<Part["patch"]>, room: Scene["room"]): Vector[] {
+  const across = "xyz".indexOf(patch.wall[0] ?? "x");
+  const side = patch.wall.endsWith("max") ? room.upper_m : room.lower_m;
+  const [low, high] = [patch.lower_m, patch.upper_m];
+  return [low, [high[0]!, low[1]!], high, [low[0]!, high[1]!]].map((corner) => {
+    const place = [...corner];
+    place.splice(across, 0, side[across] ?? 0);
+    return place as Vector;
+  });
+}
