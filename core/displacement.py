@@ -33,13 +33,18 @@ _FAINT = 2.0
 
 
 def measure_shift(
-    reference_image: AnyImage, flow_image: AnyImage, difference_variance: AnyImage | float, window_px: int
+    reference_image: AnyImage,
+    flow_image: AnyImage,
+    difference_variance: AnyImage | float,
+    window_px: int,
+    *,
+    follow: bool = True,
 ) -> ShiftMeasurement:
     """Displacement of every whole window of `window_px`, from the image edge on.
 
     `difference_variance` is the variance of one pixel of `flow_image - reference_image`, in the images'
-    unit squared; each window takes its mean. Raises SettingError for unequal sizes, an image smaller than one
-    window, or no noise.
+    unit squared; each window takes its mean. Without `follow` every window is taken to have hardly moved. Raises
+    SettingError for unequal sizes, an image smaller than one window, or no noise.
     """
     check_pair(reference_image, flow_image, window_px)
     if not (np.isfinite(difference_variance).all() and np.min(difference_variance) > 0):
@@ -52,7 +57,7 @@ def measure_shift(
     variance = _blocks(variance, window_px).mean(axis=(1, 2))
     fit = _hardly_moved(reference_image, flow_image, variance, window_px)
     far = np.abs(fit.displacement_px).max(axis=1) > _SMALL_PX
-    if far.any() or _lost(fit).any():
+    if follow and (far.any() or _lost(fit).any()):
         fit = _followed(fit, far, WindowSearch(reference_image, flow_image, window_px), centres, variance)
     return ShiftMeasurement(
         centres_px=centres,

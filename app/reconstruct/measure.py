@@ -79,25 +79,47 @@ def _measure_view(
     if border.mean() < 0.01:
         shift = measure_shift(before.mean, after.mean, variance, window_px)
         note = "No part of the picture is free of the room's air: drift between exposures was not removed."
-        return _select(shift, in_room), Similarity(), note
-    moved, drift = before.mean, Similarity()
-    shift = measure_shift(moved, after.mean, variance, window_px)
-    rest, covariance = fit_similarity(shift, border, before.mean.shape)
+        return _in_room(shift, in_room, Similarity(), note)
+    moved, drift, shape = before.mean, Similarity(), before.mean.shape
     for _ in range(_DRIFT_PASSES):
+        rest, _ = _drift_of(
+            measure_shift(moved, after.mean, variance, window_px, follow=False), border, shape
+        )
         if max(abs(rest.column_px), abs(rest.row_px)) < _SMALL_DRIFT_PX:
             break
         drift = rest.after(drift)
         moved = move_image(before.mean, drift)
-        shift = measure_shift(moved, after.mean, variance, window_px)
-        rest, covariance = fit_similarity(shift, border, before.mean.shape)
-    static = rest.displacement_px(shift.centres_px, before.mean.shape)
-    shift = replace_displacement(shift, shift.displacement_px - static, covariance, before.mean.shape)
+    shift = measure_shift(moved, after.mean, variance, window_px)
+    rest, covariance = _drift_of(shift, border, shape)
+    static = rest.displacement_px(shift.centres_px, shape)
+    shift = replace_displacement(shift, shift.displacement_px - static, covariance, shape)
     total = rest.after(drift)
     note = (
         f"Drift between the exposures, from the border: {total.column_px:+.4f} px across, "
         f"{total.row_px:+.4f} px down, {1e6 * total.rotation_rad:+.1f} urad; removed."
     )
-    return _select(shift, in_room), total, note
+    return _in_room(shift, in_room, total, note)
+
+
+def _drift_of(
+    shift: ShiftMeasurement, border: np.ndarray, shape: tuple[int, int]
+) -> tuple[Similarity, np.ndarray]:
+    """The motion of the border's good windows, and its covariance."""
+    return fit_similarity(shift, border if shift.refused is None else border & ~shift.refused, shape)
+
+
+def _in_room(
+    shift: ShiftMeasurement, in_room: np.ndarray, drift: Similarity, note: str
+) -> tuple[ShiftMeasurement, Similarity, str]:
+    """The good windows that see the room's wall; what was refused is told."""
+    shift = shift.at(in_room)
+    refused = 0.0 if shift.refused is None else float(shift.refused.mean())
+    if refused > 0:
+        note += (
+            f" {100 * refused:.1f} % of the windows show something else than the pattern, moved, in one of the "
+            "pictures (a person, a reflection, another light), and are left out."
+        )
+    return shift.good(), drift, note
 
 
 def replace_displacement(
@@ -107,22 +129,13 @@ def replace_displacement(
     basis = similarity_basis(shift.centres_px, shape)
     added = np.einsum("wap,pq,wbq->wab", basis, drift_covariance, basis, optimize=True)
     information = np.linalg.inv(np.linalg.inv(shift.information_per_px2) + added)
-    return ShiftMeasurement(shift.centres_px, displacement_px, information, shift.window_px)
+    return ShiftMeasurement(shift.centres_px, displacement_px, information, shift.window_px, shift.refused)
 
 
 def _whole(centres_px: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Windows whose gradient does not reach beyond the picture's edge."""
     edge = len(derivative_filter()) // 2
     return np.all((centres_px > edge) & (centres_px < np.array(shape[::-1]) - 1 - edge), axis=1)
-
-
-def _select(shift: ShiftMeasurement, chosen: np.ndarray) -> ShiftMeasurement:
-    return ShiftMeasurement(
-        shift.centres_px[chosen],
-        shift.displacement_px[chosen],
-        shift.information_per_px2[chosen],
-        shift.window_px,
-    )
 
 
 def _check_captures(reference: Capture, flow: Capture, scene: Scene) -> None:
