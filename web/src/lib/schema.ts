@@ -404,9 +404,33 @@ export interface paths {
         head?: never;
         /**
          * Change Experiment
-         * @description Change title, notes, or the board to calibrate with.
+         * @description Change title, notes, or the board to calibrate with; what is left out stays as somebody else left it.
          */
         patch: operations["change_experiment_api_experiments__experiment__patch"];
+        trace?: never;
+    };
+    "/api/experiments/{experiment}/addresses": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read Addresses
+         * @description List what the experiment opens, and what of it is confirmed.
+         */
+        get: operations["read_addresses_api_experiments__experiment__addresses_get"];
+        /**
+         * Confirm Addresses
+         * @description Confirm, once, that the experiment may open these; they must be the ones that it names now.
+         */
+        put: operations["confirm_addresses_api_experiments__experiment__addresses_put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
         trace?: never;
     };
     "/api/experiments/{experiment}/calibration": {
@@ -999,7 +1023,7 @@ export interface paths {
         post: operations["open_session_api_session_post"];
         /**
          * Close Session
-         * @description Forget the session in this browser.
+         * @description End the session: its cookie opens nothing any more, wherever it is.
          */
         delete: operations["close_session_api_session_delete"];
         options?: never;
@@ -1086,6 +1110,24 @@ export interface components {
             python: string;
             /** Version */
             version: string;
+        };
+        /**
+         * AddressLine
+         * @description A device file or a host, and whether an operator confirmed it.
+         */
+        AddressLine: {
+            /** Address */
+            address: string;
+            /** Confirmed */
+            confirmed: boolean;
+        };
+        /**
+         * AddressesResource
+         * @description What an experiment opens; empty for a simulated rig.
+         */
+        AddressesResource: {
+            /** Addresses */
+            addresses: components["schemas"]["AddressLine"][];
         };
         /**
          * BoardGeometry
@@ -1206,6 +1248,8 @@ export interface components {
         /**
          * CaptureResource
          * @description One capture. `interrupted` ones have no manifest and are never used as a measurement.
+         *
+         *     `reason` says why a `broken` one cannot be read. `revision` goes into the `If-Match` of a change of its notes.
          */
         CaptureResource: {
             /** Capture */
@@ -1218,6 +1262,13 @@ export interface components {
             height_px: number | null;
             /** Notes */
             notes: string;
+            /**
+             * Reason
+             * @default
+             */
+            reason?: string;
+            /** Revision */
+            revision: string;
             /** Role */
             role: string | null;
             /** Settings */
@@ -1226,7 +1277,7 @@ export interface components {
              * State
              * @enum {string}
              */
-            state: "finished" | "incomplete" | "interrupted";
+            state: "finished" | "incomplete" | "interrupted" | "broken";
             /** Verdicts */
             verdicts: components["schemas"]["VerdictResource"][];
             /** Width Px */
@@ -1261,6 +1312,14 @@ export interface components {
             readings: components["schemas"]["ReadingResource"][];
             /** Scores */
             scores: components["schemas"]["ScoreResource"][];
+        };
+        /**
+         * ConfirmAddresses
+         * @description The addresses as they were shown to the operator.
+         */
+        ConfirmAddresses: {
+            /** Addresses */
+            addresses: string[];
         };
         /**
          * Curves
@@ -1341,6 +1400,9 @@ export interface components {
         /**
          * ExperimentLine
          * @description One line of the list of experiments; `uncalibrated` names the parts of the rig that need it still.
+         *
+         *     `reason` says what is wrong with an experiment that cannot be read: then only its name and date are known.
+         *     `revision` goes into the `If-Match` of a change.
          */
         ExperimentLine: {
             /** Calibrated */
@@ -1364,8 +1426,15 @@ export interface components {
             planned: boolean;
             /** Projector */
             projector: boolean;
+            /**
+             * Reason
+             * @default
+             */
+            reason?: string;
             /** Results */
             results: number;
+            /** Revision */
+            revision: string;
             /** Title */
             title: string;
             /** Uncalibrated */
@@ -1397,8 +1466,15 @@ export interface components {
             planned: boolean;
             /** Projector */
             projector: boolean;
+            /**
+             * Reason
+             * @default
+             */
+            reason?: string;
             /** Results */
             results: number;
+            /** Revision */
+            revision: string;
             /** Settings */
             settings: {
                 [key: string]: unknown;
@@ -1867,12 +1943,21 @@ export interface components {
         /**
          * Problem
          * @description RFC 9457 problem details. `detail` is written for the operator and is shown as it is.
+         *
+         *     `current` and `sent` are both versions of what somebody else changed meanwhile (code `changed`).
          */
         Problem: {
             /** Cause */
             cause: string;
             /** Code */
             code: string;
+            /**
+             * Current
+             * @default null
+             */
+            current?: {
+                [key: string]: unknown;
+            } | null;
             /** Detail */
             detail: string;
             /**
@@ -1887,6 +1972,13 @@ export interface components {
             instance?: string | null;
             /** Next Step */
             next_step: string;
+            /**
+             * Sent
+             * @default null
+             */
+            sent?: {
+                [key: string]: unknown;
+            } | null;
             /** Status */
             status: number;
             /** Title */
@@ -1968,6 +2060,8 @@ export interface components {
         /**
          * ResultLine
          * @description One line of the list of results. `interrupted` ones have no manifest and are never used.
+         *
+         *     `reason` says why a `broken` one cannot be read.
          */
         ResultLine: {
             /** Created */
@@ -1976,6 +2070,11 @@ export interface components {
             outcome: string | null;
             /** Preset */
             preset: string | null;
+            /**
+             * Reason
+             * @default
+             */
+            reason?: string;
             /** Result */
             result: string;
             /** State */
@@ -2140,22 +2239,36 @@ export interface components {
         };
         /**
          * Upload
-         * @description A file that was checked, read and kept.
+         * @description A file that was checked, read and kept; `reason` says why a `broken` one cannot be read any more.
          */
         Upload: {
             /** Arrays */
-            arrays: components["schemas"]["UploadedArray"][];
-            /** Bytes */
-            bytes: number;
+            arrays?: components["schemas"]["UploadedArray"][];
+            /**
+             * Bytes
+             * @default 0
+             */
+            bytes?: number;
             /**
              * Kind
              * @enum {string}
              */
-            kind: "png" | "tiff" | "npy" | "npz";
-            /** Received S */
-            received_s: number;
-            /** Sha256 */
-            sha256: string;
+            kind: "png" | "tiff" | "npy" | "npz" | "broken";
+            /**
+             * Reason
+             * @default
+             */
+            reason?: string;
+            /**
+             * Received S
+             * @default 0
+             */
+            received_s?: number;
+            /**
+             * Sha256
+             * @default
+             */
+            sha256?: string;
             /** Upload */
             upload: string;
         };
@@ -2279,6 +2392,8 @@ export interface components {
 }
 export type Abort = components['schemas']['Abort'];
 export type About = components['schemas']['About'];
+export type AddressLine = components['schemas']['AddressLine'];
+export type AddressesResource = components['schemas']['AddressesResource'];
 export type BoardGeometry = components['schemas']['BoardGeometry'];
 export type CalibrationItem = components['schemas']['CalibrationItem'];
 export type CalibrationResource = components['schemas']['CalibrationResource'];
@@ -2288,6 +2403,7 @@ export type CaptureChange = components['schemas']['CaptureChange'];
 export type CaptureResource = components['schemas']['CaptureResource'];
 export type ChoiceLine = components['schemas']['ChoiceLine'];
 export type ComparisonResource = components['schemas']['ComparisonResource'];
+export type ConfirmAddresses = components['schemas']['ConfirmAddresses'];
 export type Curves = components['schemas']['Curves'];
 export type DeskResource = components['schemas']['DeskResource'];
 export type EventResource = components['schemas']['EventResource'];
@@ -3296,7 +3412,10 @@ export interface operations {
     change_experiment_api_experiments__experiment__patch: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description The `revision` that the change is made to; left out, the newest one is changed. */
+                "if-match"?: string | null;
+            };
             path: {
                 /** @description An id that the service gave. */
                 experiment: string;
@@ -3316,6 +3435,92 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ExperimentResource"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "5XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_addresses_api_experiments__experiment__addresses_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description An id that the service gave. */
+                experiment: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AddressesResource"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "5XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    confirm_addresses_api_experiments__experiment__addresses_put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description An id that the service gave. */
+                experiment: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ConfirmAddresses"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AddressesResource"];
                 };
             };
             /** @description What happened, why, and what to do. */
@@ -3865,7 +4070,10 @@ export interface operations {
     change_capture_api_experiments__experiment__captures__capture__patch: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description The `revision` that the change is made to; left out, the newest one is changed. */
+                "if-match"?: string | null;
+            };
             path: {
                 /** @description An id that the service gave. */
                 experiment: string;
