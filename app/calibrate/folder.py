@@ -14,14 +14,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from app.errors import BadInputError
 from app.experiment.calibration import read_bundle
 from app.experiment.folder import ExperimentSettings, open_experiment
 from app.files.durable import make_folder, write_text
 from app.files.lock import locked
+from app.files.reading import reading
 from app.rig.conditions import Conditions, known_pairs
 from calibration.bundle import Bundle, to_json
-from calibration.errors import CalibrationError
 from calibration.model import Model
 from calibration.record import Record, record_from_json, record_to_json
 
@@ -153,10 +152,8 @@ class CalibrationFolder:
 
 
 def _read_record(path: Path) -> Record:
-    try:
+    with reading(path, "Remove it and calibrate again."):
         return record_from_json(path.read_text(encoding="utf-8"), str(path))
-    except (CalibrationError, UnicodeDecodeError) as error:
-        raise BadInputError(str(error)) from error
 
 
 def now() -> str:

@@ -1,8 +1,6 @@
 """Which parts of an experiment's rig are calibrated, which stand as they were given, and which are missing."""
 
-import functools
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from app.calibrate.folder import CalibrationFolder, StepName
@@ -42,14 +40,8 @@ def is_calibrated(parts: tuple[Part, ...]) -> bool:
 
 
 def bundle_of(experiment: Experiment) -> Bundle:
-    """The calibration so far, read again only when it was written; empty at first. Raises BadInputError."""
-    path = experiment.bundle_path
-    return _read(experiment.folder, path.stat().st_mtime_ns if path.exists() else 0)
-
-
-@functools.lru_cache(maxsize=64)
-def _read(folder: Path, _written_ns: int) -> Bundle:
-    return CalibrationFolder(folder).bundle()
+    """The calibration so far; empty at first. Raises BadInputError."""
+    return CalibrationFolder(experiment.folder).bundle()
 
 
 def _state(*qualities: Quality | None) -> PartState:

@@ -33,6 +33,19 @@ def test_an_experiment_that_cannot_be_read_is_a_line_with_its_reason(live: Live,
     shutil.rmtree(path.parent)
 
 
+@pytest.mark.parametrize("text", [b"", b"[" * 50_000, b'{"date": ' + b"9" * 5000, b"\xff"])
+def test_a_calibration_that_cannot_be_read_is_a_reason_and_no_fault(live: Live, text: bytes):
+    experiment = made(live)
+    folder = live.config.data_root / "experiments" / experiment / "calibration"
+    folder.mkdir()
+    (folder / "bundle.json").write_bytes(text)
+    with live.client() as client:
+        lines = {line["experiment"]: line for line in client.get("/api/experiments").json()}
+        assert "bundle.json" in lines[experiment]["reason"]
+        assert is_problem(client.get(f"/api/experiments/{experiment}/calibration"), "bad_input")
+    shutil.rmtree(folder.parent)
+
+
 @pytest.mark.parametrize(
     "text", [b"", b"[]", b"{}", b"[" * 5000, b'{"views": 1, "role": "flow"}', b'{"role": "\\ud800"}', b"\xff"]
 )
