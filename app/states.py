@@ -39,7 +39,8 @@ class Machine(Generic[S, E]):
     def refusal(self, state: S, event: E, who: str = "") -> str:
         """Say why not, and what is possible."""
         possible = [str(one) for one in self.table[state] if one in self.asked]
-        ways = f"What can be asked of it now: {', '.join(possible)}." if possible else "It stays so."
+        ends = "Wait until it has ended, or stop it." if self.table[state] else "It stays so."
+        ways = f"What can be asked of it now: {', '.join(possible)}." if possible else ends
         return f"{who or self.name} is {state}: there is nothing to {event}. {ways}"
 
     def reachable(self, state: S) -> set[S]:

@@ -52,7 +52,7 @@ def test_a_camera_that_is_unplugged_during_a_burst(station: Station, opens: Open
     page.get_by_role("button", name="Take reference").click()
     desk = page.locator(".desk")
     expect(desk).to_contain_text("incomplete")
-    expect(desk).to_contain_text(re.compile(r"device lost.*\d+ of 100 frames are kept.*Take it again"))
+    expect(desk).to_contain_text(re.compile(r"device lost.*after \d+ of 100 frames.*kept.*Take it again"))
     expect(page.locator(".library")).to_contain_text("never used as a measurement")
     snapshot(page, "fault-unplugged-in-a-burst")
     page.locator("button.next", has_text="Reconnect the camera").click()

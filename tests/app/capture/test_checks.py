@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 from app.capture.burst import take
 from app.capture.checks import aged
 from app.cli import create_cli
-from app.experiment.captures import load_capture
+from app.experiment.captures import load_capture, newest_pair
 from app.experiment.folder import Experiment, ExperimentSettings, create_experiment
-from app.experiment.rig_settings import ProjectorSettings, RigSettings
+from app.experiment.rig_settings import ProjectorSettings, RigSettings, SimulatedCameraSettings
 from app.rig.conditions import Conditions, conditions_of
 from calibration.bundle import given_bundle, to_json
 from core.geometry import Box, Optics
@@ -61,7 +61,7 @@ def test_a_capture_says_that_its_calibration_is_old_and_cold_and_the_result_will
     # On for four minutes is also what the warm-up verdict is about.
     assert any(v.name == "warm-up" and not v.good for v in taken.burst.verdicts)
 
-    found = aged(experiment)
+    found = aged(experiment, newest_pair(experiment))
 
     assert len(found) == 6
     assert found[0].startswith("The reference capture: The calibration is 30 days older")
@@ -109,7 +109,8 @@ def test_the_camera_sees_what_the_simulated_projector_shows(tmp_path):
     projector = dataclasses.replace(camera, position_m=(0.2, -3.0, 0.0), focal_px=(900.0, 900.0))
     scene = Scene(room=ROOM, views=(View(camera=camera),), light=ProjectedPattern(projector=projector))
     folder = tmp_path / "experiment"
-    create_experiment(folder, ExperimentSettings(scene=scene))
+    rig = RigSettings(camera=SimulatedCameraSettings())
+    create_experiment(folder, ExperimentSettings(scene=scene, rig=rig))
 
     done = CliRunner().invoke(create_cli(), ["projector", "check", str(folder), "--json"])
 

@@ -17,7 +17,7 @@ from app.commands import COMMANDS
 from app.commands.calibrate import STEPS
 from app.commands.lazy import commands_of
 from app.experiment.captures import load_capture
-from app.experiment.folder import Experiment
+from app.experiment.folder import Experiment, finished
 from app.rig.conditions import Conditions
 from app.rig.live_camera import LiveCamera
 from app.simulate.rehearsal import Rehearsal, rehearse
@@ -107,9 +107,9 @@ def by_service(experiment: Experiment) -> None:
 def test_a_capture_says_what_was_asked_and_stated_by_the_same_names_whoever_asked(experiment):
     said = []
     for asks in (by_shell, by_service):
-        before = set(experiment.captures("reference"))
+        before = set(finished(experiment.captures_folder))
         asks(experiment)
-        taken = sorted(set(experiment.captures("reference")) - before)
+        taken = sorted(set(finished(experiment.captures_folder)) - before)
         assert len(taken) == 2
         manifests = [load_capture(folder).manifest for folder in taken]
         for manifest in manifests:

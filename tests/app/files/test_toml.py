@@ -45,6 +45,7 @@ def test_settings_survive_the_way_to_toml_and_back(tmp_path):
 )
 def test_an_unknown_key_is_refused_with_its_name_and_the_nearest_known_one(place, key, nearest):
     data = to_plain(example())
+    data["rig"]["camera"] = {"kind": "simulated"}
     target = data
     for part in place:
         target = target[part]

@@ -95,7 +95,7 @@ def test_a_truth_that_cannot_be_read_costs_the_comparison_only(kept):
     page = render_report(read_finding(kept.experiment, kept.experiment.results_folder / "one"))
     truth.unlink()
     assert len(missing(page)) == 2
-    assert all("truth.npz is not a readable NPZ" in why for why in missing(page))
+    assert all("truth.npz cannot be read" in why for why in missing(page))
     assert page.count("data:image/png") == render_report(kept).count("data:image/png")
 
 
@@ -110,7 +110,7 @@ def test_a_picture_and_a_shift_that_cannot_be_read_cost_their_own_sections_only(
     (folder / "shift-0.nc").write_bytes(shift)
     saw, moved = missing(page)
     assert "flow.tif is not the file that was kept" in saw
-    assert "shift-0.nc is not a readable shift file" in moved
+    assert "shift-0.nc cannot be read" in moved
     # The air is drawn, and the first sentence says why it is missing.
     assert page.count("data:image/png") == 1
     assert "Not told:" in page

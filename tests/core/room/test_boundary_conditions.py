@@ -178,7 +178,7 @@ def test_layers_exchange_all_heat_that_is_not_lost():
         ((SUPPLY,), "cannot leave"),
         ((SUPPLY, EXHAUST, EXHAUST), "overlap"),
         ((Outlet(patch=Patch(wall="y_max", lower_m=(3.0, 1.0), upper_m=(4.5, 2.0))),), "the wall spans"),
-        ((Wall(wall="x_min"), Wall(wall="x_min", thermal="adiabatic")), "stated twice"),
+        ((Wall(wall="x_min"), Wall(wall="x_min", thermal="adiabatic")), "described 2 times"),
         (
             (Inlet(patch=SUPPLY.patch, temperature_k=300.0, velocity_m_s=(-0.5, 0.0, 0.0)), EXHAUST),
             "does not enter",
