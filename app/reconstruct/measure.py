@@ -113,8 +113,8 @@ def _in_room(
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     """The good windows that see the room's wall; what was refused is told."""
     shift = shift.at(in_room)
-    refused = 0.0 if shift.refused is None else float(shift.refused.mean())
-    if refused > 0:
+    if shift.refused is not None and np.any(shift.refused):
+        refused = float(shift.refused.mean())
         note += (
             f" {100 * refused:.1f} % of the windows show something else than the pattern, moved, in one of the "
             "pictures (a person, a reflection, another light), and are left out."

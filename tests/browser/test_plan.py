@@ -23,7 +23,7 @@ def test_a_plan_says_what_would_be_seen_and_what_each_preset_would_cost(station:
     expect(page.locator("main")).to_contain_text("Choices made by auto")
     snapshot(page, "plan")
     page.get_by_role("button", name="Reconstruct", exact=True).click()
-    preset = page.locator(".choice").filter(has_text="standard").first
+    preset = page.locator(".choice", has=page.get_by_text("standard", exact=True))
     expect(preset).to_contain_text(re.compile(r"about [\d.]+ (s|min|h)|Not predicted: \w+"))
     snapshot(page, "reconstruct-predicted")
     assert watched.complaints == []

@@ -6,22 +6,21 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import app
 from app.cli import create_cli
 from app.errors import AirlensError
 from app.experiment.folder import open_experiment
 from app.experiment.rig_settings import SimulatedCameraSettings
 from app.simulate.experiment import simulate
+from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.scene import RigOptions
 from drivers.errors import DeviceNotFoundError
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    room = Path(app.__file__).parent / "sample" / "room.npz"
     options = RigOptions(camera_px=(160, 120), frames=2)
     camera = SimulatedCameraSettings(drift_px=0.3)
-    return simulate(room, tmp_path_factory.mktemp("story") / "experiment", options, "surveyed", camera)
+    return simulate(SAMPLE_ROOM, tmp_path_factory.mktemp("story") / "experiment", options, "surveyed", camera)
 
 
 def run(*words):
@@ -67,4 +66,5 @@ def test_a_real_camera_that_is_not_there_is_said(folder, tmp_path):
     with pytest.raises(DeviceNotFoundError, match="airlens devices"):
         run("preview", other)
     with pytest.raises(AirlensError, match="keep or discard"):
-        run("capture", "flow", other, "--on-abort", "burn")
+    refused = CliRunner().invoke(create_cli(), ["capture", "flow", str(other), "--on-abort", "burn"])
+    assert refused.exit_code == 2 and "'burn'" in refused.output
