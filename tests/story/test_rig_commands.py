@@ -65,4 +65,5 @@ def test_a_real_camera_that_is_not_there_is_said(folder, tmp_path):
     with pytest.raises(DeviceNotFoundError, match="airlens devices"):
         run("preview", other)
     refused = CliRunner().invoke(create_cli(), ["capture", "flow", str(other), "--on-abort", "burn"])
-    assert refused.exit_code == 2 and "'burn'" in refused.output
+    assert refused.exit_code == 2
+    assert "'burn'" in refused.output
