@@ -10,6 +10,7 @@ import errno
 import io
 import os
 import sqlite3
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -31,9 +32,21 @@ class Machine:
         self.kill_in: int | None = None
         self.dead = False
         self.clock_s = 0.0
+        self.sound_for: int | None = None
+
+    @contextlib.contextmanager
+    def behind(self) -> Iterator[None]:
+        """Let this thread, another program's hand, find the disk sound and be killed by nothing."""
+        self.sound_for = threading.get_ident()
+        try:
+            yield
+        finally:
+            self.sound_for = None
 
     def touch(self, *paths: Any, creates: bool) -> None:
         """Fail as the system would when something below the root is changed; `creates` needs space."""
+        if self.sound_for == threading.get_ident():
+            return
         if not any(str(path).startswith(self.root) for path in paths):
             return
         left = self.kill_in

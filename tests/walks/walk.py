@@ -157,11 +157,8 @@ class Walk(RuleBasedStateMachine):
 
     def _behind(self, folder: Path) -> None:
         """Delete a folder behind the program's back, whatever its disk is like."""
-        machine = self.world.machine
-        before = machine.trouble, machine.kill_in
-        machine.trouble, machine.kill_in = None, None
-        shutil.rmtree(folder, ignore_errors=True)
-        machine.trouble, machine.kill_in = before
+        with self.world.machine.behind():
+            shutil.rmtree(folder, ignore_errors=True)
 
     # What must hold
 
