@@ -63,29 +63,32 @@ def frame_of(problem: Problem) -> Frame:
 
 
 def height_profile(problem: Problem, frame: Frame, spans: Spans) -> FlowValues:
-    """Median over y of T and p on a known plane across x or y, carried through the room.
+    """T and p of an upright column of air, carried through the room.
 
-    Without a plane the temperature of the air that leaves, where an outlet knows it, with the pressure of
-    that column: started without it the first step takes the buoyancy out of T instead of building p.
+    Of a known plane across x or y: the median over y. Without a plane the temperature of the air that leaves,
+    where an outlet knows it, with the pressure of that column: started without it the first step takes the
+    buoyancy out of T instead of building p.
     """
-    shape = tuple(span[2] for span in spans)
-    temperature = np.zeros(shape, np.float32)
-    pressure = np.zeros(shape, np.float32)
-    leaving_k = leaving_excess_k(problem) if measured_outlets(problem.scene) else None
-    if leaving_k is not None:
-        level = leaving_k / frame.scales.excess_k
-        temperature += level
-        pressure += frame.numbers.richardson * level * (positions(spans[2]) - outlet_height(problem, frame))
+    height, scales = positions(spans[2]), frame.scales
+    temperature = pressure = np.zeros(len(height))
     upright = [plane for plane in problem.planes if face_of(plane.wall).axis != 2]
     if upright:
-        plane, scales = upright[0], frame.scales
-        z_m = frame.room.lower_m[2] + scales.length_m * positions(spans[2])
+        plane = upright[0]
+        z_m = frame.room.lower_m[2] + scales.length_m * height
         excess = np.median(plane.temperature_k, axis=0) - scales.reference_k
-        temperature[...] = np.interp(z_m, plane.second_m, excess / scales.excess_k)
-        pressure += (
-            np.interp(z_m, plane.second_m, np.median(plane.pressure_m2_s2, axis=0)) / scales.pressure_m2_s2
-        )
-    return FlowValues(jnp.asarray(temperature), jnp.asarray(pressure), jnp.zeros((*shape, 3)))
+        temperature = np.interp(z_m, plane.second_m, excess / scales.excess_k)
+        kinematic = np.median(plane.pressure_m2_s2, axis=0) / scales.pressure_m2_s2
+        pressure = np.interp(z_m, plane.second_m, kinematic)
+    elif measured_outlets(problem.scene) and (leaving_k := leaving_excess_k(problem)) is not None:
+        level = leaving_k / scales.excess_k
+        temperature = np.full(len(height), level)
+        pressure = frame.numbers.richardson * level * (height - outlet_height(problem, frame))
+    shape = tuple(span[2] for span in spans)
+    return FlowValues(
+        jnp.broadcast_to(jnp.asarray(temperature, jnp.float32), shape),
+        jnp.broadcast_to(jnp.asarray(pressure, jnp.float32), shape),
+        jnp.zeros((*shape, 3)),
+    )
 
 
 def outlet_height(problem: Problem, frame: Frame) -> float:
