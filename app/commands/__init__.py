@@ -4,6 +4,10 @@ A new command is a module here and a line in `COMMANDS`: its name, its module, a
 """
 
 COMMANDS = {
+    "new": (
+        "app.commands.new",
+        "Make an experiment for your rig and room from answers that a tape measure and a thermometer give.",
+    ),
     "calibrate": (
         "app.commands.calibrate",
         "Calibrate camera, projector, wall and response: live on the experiment's rig, guided, or from --images.",
@@ -56,6 +60,10 @@ COMMANDS = {
     "simulate": (
         "app.commands.simulate",
         "Make a complete experiment from a room volume: scene, calibration, reference and flow captures.",
+    ),
+    "schema": (
+        "app.commands.schema",
+        "Print the JSON Schema of experiment.toml, or of the answers, for editors.",
     ),
     "bench": ("app.commands.bench", "Measure speed and the error that it bought."),
 }

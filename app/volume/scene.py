@@ -178,22 +178,28 @@ def _covering(
 
 
 def _light(room: Box, camera: Optics, options: RigOptions) -> Light:
-    pixel_m = options.stand_off_m / camera.focal_px[0]
     if options.light == "texture":
-        # Printed twice as fine as the camera's pixels; the finest band is 5 of these. Finer bands alias
-        # in the camera: at 3 px a drift of 0.1 px is measured 0.6 % wrong, at 5 px 0.2 %.
-        return FixedTexture(
-            pattern=WaveletPattern(seed=options.pattern_seed, finest_px=FINEST_PX), pixel_m=pixel_m / 2
-        )
+        return printed(camera, options.stand_off_m, options.pattern_seed)
     projector = _covering(
         room, options.projector_px, options.border_px, options.stand_off_m, options.baseline_m
     )
-    # The finest band: at least 2 projector pixels and at least 3 camera pixels.
+    return projected(camera, projector, options.pattern_seed)
+
+
+def printed(camera: Optics, stand_off_m: float, seed: int) -> FixedTexture:
+    """The print for a camera at this distance: twice as fine as its pixels, the finest band 5 of them.
+
+    Finer bands alias in the camera: at 3 px a drift of 0.1 px is measured 0.6 % wrong, at 5 px 0.2 %.
+    """
+    pixel_m = stand_off_m / camera.focal_px[0]
+    return FixedTexture(pattern=WaveletPattern(seed=seed, finest_px=FINEST_PX), pixel_m=pixel_m / 2)
+
+
+def projected(camera: Optics, projector: Optics, seed: int) -> ProjectedPattern:
+    """The pattern to project: the finest band is at least 2 projector pixels and at least 3 camera pixels."""
     magnification = camera.focal_px[0] / projector.focal_px[0]
     finest = max(2.0, 3.0 / magnification)
-    return ProjectedPattern(
-        pattern=WaveletPattern(seed=options.pattern_seed, finest_px=finest), projector=projector
-    )
+    return ProjectedPattern(pattern=WaveletPattern(seed=seed, finest_px=finest), projector=projector)
 
 
 def _inlet(inlet: dict[str, Any], volume: RoomVolume) -> Inlet:

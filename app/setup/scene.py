@@ -1,0 +1,237 @@
+"""Answers to the scene and the rig that they describe. Raises BadInputError with the answer's name."""
+
+import math
+
+from app.errors import BadInputError
+from app.experiment.folder import ExperimentSettings
+from app.experiment.rig_settings import (
+    ProjectorSettings,
+    RigSettings,
+    SimulatedCameraSettings,
+    V4l2CameraSettings,
+)
+from app.setup.answers import Answers, CameraAnswer, Opening, SupplyAnswer
+from app.volume.scene import printed, projected
+from core.air import Air
+from core.geometry import WALLS, Box, Optics, Vector3, face_of, looking_along_y
+from core.known import refuse_overlaps
+from core.scene import (
+    BoundaryInformation,
+    CameraNoise,
+    Heater,
+    Inlet,
+    Light,
+    Outlet,
+    Patch,
+    PointSensors,
+    Scene,
+    View,
+    Wall,
+)
+from core.setting import SettingError
+
+TRUTH_FILE = "truth.npz"
+SENSORS_FILE = "boundary/sensors.csv"
+
+
+def settings_of(answers: Answers, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> ExperimentSettings:
+    """The experiment's settings; `corner_m` is where the world has the corner that answers are measured from.
+
+    Raises BadInputError: an opening off its wall, two in one place, trapped air.
+    """
+    room = Box(lower_m=corner_m, upper_m=_moved(answers.room, corner_m))
+    try:
+        optics = _optics(answers.camera, room)
+        scene = Scene(
+            room=room,
+            air=Air(ambient_temperature_k=answers.air),
+            views=(
+                View(
+                    camera=optics, noise=CameraNoise(bits=answers.camera.bits), frames=answers.camera.frames
+                ),
+            ),
+            light=_light(answers, optics, room),
+            boundary=tuple(_boundary(answers, room)),
+        )
+    except SettingError as error:
+        raise BadInputError(str(error)) from error
+    title = answers.title or "A room of {:g} x {:g} x {:g} m".format(*answers.room)
+    return ExperimentSettings(title=title, information="operator", rig=_rig(answers), scene=scene)
+
+
+def sensor_table(answers: Answers, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> str:
+    """The thermometers and anemometers as the CSV that a scene names; empty where there are none."""
+    rows = [
+        [*_moved(sensor.position, corner_m), sensor.temperature, sensor.temperature_deviation, "", "", "", ""]
+        for sensor in answers.thermometer
+    ]
+    rows += [
+        [*_moved(meter.position, corner_m), "", "", *meter.velocity, meter.deviation]
+        for meter in answers.anemometer
+    ]
+    lines = [",".join(value if isinstance(value, str) else f"{value:.9g}" for value in row) for row in rows]
+    return "\n".join(["x,y,z,T,T_std,u,v,w,u_std", *lines, ""]) if rows else ""
+
+
+def picture_on_wall_m(optics: Optics, room: Box) -> tuple[float, float]:
+    """Width and height of the wall that the camera sees."""
+    distance_m = room.upper_m[1] - optics.position_m[1]
+    return optics.width_px * distance_m / optics.focal_px[0], optics.height_px * distance_m / optics.focal_px[
+        1
+    ]
+
+
+def _optics(camera: CameraAnswer, room: Box) -> Optics:
+    """Straight at the patterned wall; from its middle where only the distance is told."""
+    back_m = room.upper_m[1]
+    if camera.position is None:
+        position = (room.centre_m[0], back_m - (camera.distance or 0.0), room.centre_m[2])
+    else:
+        position = _moved(camera.position, room.lower_m)
+    if position[1] >= back_m:
+        raise BadInputError(
+            f"camera.position: y is {position[1] - room.lower_m[1]:g} m, at or behind the patterned wall at "
+            f"y = {room.size_m[1]:g} m. "
+            "The camera stands before it: give a smaller y (below 0 is before the room)."
+        )
+    return _straight(position, camera.width_px, camera.height_px, _focal_px(camera))
+
+
+def _moved(place_m: Vector3, corner_m: Vector3) -> Vector3:
+    x, y, z = (value + corner for value, corner in zip(place_m, corner_m, strict=True))
+    return x, y, z
+
+
+def _straight(position_m: Vector3, width_px: int, height_px: int, focal_px: float) -> Optics:
+    return looking_along_y(position_m=position_m, width_px=width_px, height_px=height_px, focal_px=focal_px)
+
+
+def _focal_px(camera: CameraAnswer) -> float:
+    if camera.angle_of_view is not None:
+        return _focal_of_angle(camera.width_px, camera.angle_of_view)
+    return (camera.focal_length or 0.0) / (camera.pixel_pitch or 1.0)
+
+
+def _focal_of_angle(width_px: int, angle_deg: float) -> float:
+    return 0.5 * width_px / math.tan(math.radians(angle_deg) / 2)
+
+
+def _light(answers: Answers, camera: Optics, room: Box) -> Light:
+    thrown = answers.projector
+    if thrown is None:
+        return printed(camera, room.upper_m[1] - camera.position_m[1], answers.pattern_seed)
+    focal_px = _focal_of_angle(thrown.width_px, thrown.angle_of_view)
+    projector = _straight(_moved(thrown.position, room.lower_m), thrown.width_px, thrown.height_px, focal_px)
+    return projected(camera, projector, answers.pattern_seed)
+
+
+def _rig(answers: Answers) -> RigSettings:
+    camera, projector = answers.camera, answers.projector
+    if camera.kind == "simulated":
+        device = SimulatedCameraSettings(room=TRUTH_FILE, exposure_s=camera.exposure)
+    else:
+        device = V4l2CameraSettings(
+            kind="v4l2",
+            device=camera.device,
+            pixel_format=camera.pixel_format,
+            width_px=camera.width_px,
+            height_px=camera.height_px,
+            bits=camera.bits,
+            exposure_s=camera.exposure,
+        )
+    spoken = ProjectorSettings(url=projector.url) if projector and projector.url else None
+    return RigSettings(camera=device, projector=spoken)
+
+
+def _boundary(answers: Answers, room: Box) -> list[BoundaryInformation]:
+    inlets = [_inlet(item, room, f"supply {n}") for n, item in enumerate(answers.supply, 1)]
+    outlets = [
+        Outlet(
+            patch=_patch(item, room, f"outlet {n}"),
+            mean_temperature_k=item.temperature,
+            temperature_std_k=item.temperature_deviation,
+        )
+        for n, item in enumerate(answers.outlet, 1)
+    ]
+    heaters = [
+        Heater(
+            patch=_patch(item, room, f"surface {n}"),
+            temperature_k=item.temperature,
+            temperature_std_k=item.temperature_deviation,
+        )
+        for n, item in enumerate(answers.surface, 1)
+    ]
+    if bool(inlets) != bool(outlets):
+        raise BadInputError(
+            f"There are {len(inlets)} supplies and {len(outlets)} outlets: air that comes in must leave, and air "
+            "that leaves must come in. Give at least one of both ([[supply]], [[outlet]]), or none."
+        )
+    refuse_overlaps((*inlets, *outlets, *heaters))
+    sensors = [PointSensors(file=SENSORS_FILE)] if answers.thermometer or answers.anemometer else []
+    _check_places(answers, room)
+    return [*inlets, *outlets, *heaters, *_walls(answers), *sensors]
+
+
+def _walls(answers: Answers) -> list[Wall]:
+    names = [item.wall for item in answers.wall]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice:
+        raise BadInputError(f"Wall {twice} is answered twice. Say one thing about a wall.")
+    told = {
+        item.wall: Wall(
+            wall=item.wall,
+            thermal="adiabatic" if item.adiabatic else "temperature",
+            temperature_k=item.temperature,
+            temperature_std_k=item.temperature_deviation,
+        )
+        for item in answers.wall
+    }
+    return [told.get(name, Wall(wall=name)) for name in WALLS]
+
+
+def _inlet(item: SupplyAnswer, room: Box, name: str) -> Inlet:
+    patch = _patch(item, room, name)
+    face = face_of(item.wall)
+    speed_m_s = (item.speed or 0.0) if item.flow is None else item.flow / patch.area_m2
+    velocity = [0.0, 0.0, 0.0]
+    velocity[face.axis] = face.inward * speed_m_s
+    return Inlet(
+        patch=patch,
+        temperature_k=item.temperature,
+        temperature_std_k=item.temperature_deviation,
+        velocity_m_s=(velocity[0], velocity[1], velocity[2]),
+        velocity_std_m_s=item.deviation * speed_m_s,
+    )
+
+
+def _patch(item: Opening, room: Box, name: str) -> Patch:
+    """The rectangle, on its wall. Raises BadInputError."""
+    along = face_of(item.wall).along
+    for axis, low, high in zip(along, item.lower, item.upper, strict=True):
+        letter, length_m = "xyz"[axis], room.size_m[axis]
+        if low >= high:
+            raise BadInputError(
+                f"{name}: lower is {low:g} m and upper {high:g} m along {letter}; lower is the smaller one."
+            )
+        if low < -1e-9 or high > length_m + 1e-9:
+            raise BadInputError(
+                f"{name}: {low:g} to {high:g} m along {letter} is not on {item.wall}, which is 0 to {length_m:g} m "
+                f"long there. A rectangle on {item.wall} is given along {'xyz'[along[0]]}, then {'xyz'[along[1]]}."
+            )
+    first, second = (room.lower_m[axis] for axis in along)
+    return Patch(
+        wall=item.wall,
+        lower_m=(item.lower[0] + first, item.lower[1] + second),
+        upper_m=(item.upper[0] + first, item.upper[1] + second),
+    )
+
+
+def _check_places(answers: Answers, room: Box) -> None:
+    named = [("thermometer", sensor.position) for sensor in answers.thermometer]
+    named += [("anemometer", meter.position) for meter in answers.anemometer]
+    for name, place in named:
+        if not all(0 <= value <= size for value, size in zip(place, room.size_m, strict=True)):
+            raise BadInputError(
+                "A {} stands at {:g}, {:g}, {:g} m, outside the room of {:g} x {:g} x {:g} m. "
+                "Places are measured from the room's corner.".format(name, *place, *room.size_m)
+            )
