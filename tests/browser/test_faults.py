@@ -13,6 +13,7 @@ from playwright.sync_api import Page, expect
 
 from app.jobs import JobSpec
 from app.jobs.folder import read_json
+from app.reconstruct.presets import PRESETS
 from drivers.projector.escvp21 import EscVp21
 from drivers.projector.link import ProjectorLink
 from drivers.simulated import CameraFault, SimulatedCamera, VirtualClock
@@ -119,7 +120,7 @@ def test_a_worker_that_is_killed_and_a_service_that_is_restarted(station: Statio
     expect(page.locator("fieldset")).to_contain_text("Reading the presets")
     station.start()
     expect(page.locator("footer")).to_contain_text("service connected")
-    expect(page.get_by_role("radio")).to_have_count(5)
+    expect(page.get_by_role("radio")).to_have_count(len(PRESETS) + 1)
     expect(queue.locator(".light")).to_have_text("done")
     expect(queue).to_contain_text("attempt 2")
     assert read_json(attempts / "0002" / "worker.json")["pid"] == second

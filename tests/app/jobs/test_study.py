@@ -29,10 +29,10 @@ def run_all(ledger: Ledger) -> None:
 
 def test_more_light_means_less_noise_and_the_summary_shows_it(tmp_path: Path):
     ledger = Ledger(tmp_path)
-    axes = {"electrons": [2500.0, 10000.0], "frames": [1, 4]}
+    axes = {"electrons": [10000.0, 40000.0], "frames": [1, 4]}
     spec = JobSpec(kind="noise-study", settings={**SMALL, "trials": 40, "read_noise_electrons": 0.0})
     group, jobs = submit_sweep(ledger, spec, axes)
-    assert [job.title for job in jobs][:2] == ["electrons=2500.0, frames=1", "electrons=2500.0, frames=4"]
+    assert [job.title for job in jobs][:2] == ["electrons=10000.0, frames=1", "electrons=10000.0, frames=4"]
     run_all(ledger)
 
     summary = summarise(ledger, group.id)

@@ -1,6 +1,7 @@
 // What the page knows of the service, kept fresh by one stream of events. Nothing here is the only copy:
 // closing the tab loses nothing.
 import { address, ask, file, openSession, ProblemError, type Given, type Problem } from "./api";
+import { untrack } from "svelte";
 import type {
   CameraResource,
   CaptureResource,
@@ -84,9 +85,10 @@ class Bench {
   }
 
   /** Runs an action; what goes wrong is shown in the service's own words until it is dismissed, or until
-      an action that began after it succeeds. */
+      an action that began after it succeeds. An effect that calls this does not run again when another problem is
+      shown: a request that fails would be sent without end. */
   async attempt<T>(what: string, action: () => Promise<T>): Promise<T | undefined> {
-    const before = this.problem;
+    const before = untrack(() => this.problem);
     this.working = what;
     try {
       const outcome = await action();
