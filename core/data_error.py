@@ -5,6 +5,8 @@
 WALL_MARGIN = 0.06
 # What a grid and a closure cannot represent is wrong in whole jets: so many neighbouring data count as one.
 CORRELATED_DATA = 12.0
+# Of the shifts' size, what a grid cannot represent.
+REPRESENTATION = 0.3
 # Noise of a known plane. Marched rooms add what their grid cannot represent, by the misfit.
 PLANE_NOISE_K = 1e-3
 # Noise of a known plane and what the vertices of a linear solve cannot represent of it.

@@ -1,18 +1,26 @@
 """A small motion of the whole picture between two exposures: what a camera on its mount may do.
 
-Fitted to windows that are known to be still, and taken out of the reference picture.
+Fitted to windows that are known to be still, and taken out of the reference picture. What stays unknown of it is
+`core.motion`.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from scipy import ndimage
 
+from core.data_error import CORRELATED_DATA
+from core.motion import likeliest_motion, similarity_basis
 from core.problem import ShiftMeasurement
 from core.setting import setting
 
 Image = Float[np.ndarray, "rows cols"]
+
+
+# Of the robust fit: each round's weights are by the last one's residual.
+_ROUNDS = 5
 
 
 @setting
@@ -42,15 +50,6 @@ class Similarity:
         )
 
 
-def similarity_basis(
-    points_px: Float[np.ndarray, "points 2"], shape: tuple[int, int]
-) -> Float[np.ndarray, "points 2 4"]:
-    """Displacement by a unit of (column, row, rotation, dilation), about the image's centre."""
-    x, y = (points_px - (np.array(shape[::-1]) - 1) / 2).T
-    one, zero = np.ones_like(x), np.zeros_like(x)
-    return np.stack([np.stack([one, zero, -y, x], -1), np.stack([zero, one, x, y], -1)], axis=-2)
-
-
 def fit_similarity(
     measurement: ShiftMeasurement, static: np.ndarray, shape: tuple[int, int]
 ) -> tuple[Similarity, Float[np.ndarray, "4 4"]]:
@@ -65,6 +64,24 @@ def fit_similarity(
     solution = inverse @ np.einsum("wap,wa->p", weighted, measurement.displacement_px[static])
     column, row, rotation, dilation = (float(v) for v in solution)
     return Similarity(column_px=column, row_px=row, rotation_rad=rotation, dilation=dilation), inverse
+
+
+def nearly_still(measurement: ShiftMeasurement) -> ShiftMeasurement:
+    """The shifts without the motion that is likeliest if the air is still, to judge their size by.
+
+    The few windows that moved much further than the others (a thermal layer beside a wall) hardly count.
+    """
+    if measurement.motion is None:
+        return measurement
+    motions = measurement.motion.at(measurement.centres_px)
+    shifts = left = measurement.displacement_px
+    covariance = np.linalg.inv(measurement.information_per_px2)
+    for _ in range(_ROUNDS):
+        size = np.linalg.norm(left, axis=1)
+        error_px = np.maximum(np.median(size), size**2 / max(float(np.median(size)), 1e-12))
+        weight = np.linalg.inv(covariance + (error_px**2)[:, None, None] * np.eye(2)) / CORRELATED_DATA
+        left = shifts - motions @ likeliest_motion(motions, weight, shifts)
+    return replace(measurement, displacement_px=left)
 
 
 def move_image(image: Image, motion: Similarity) -> Image:

@@ -13,13 +13,15 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float
 
+from core.motion import CameraMotion
 from core.scene import Scene
 
 
 class ShiftMeasurement(eqx.Module):
     """What one view saw, compressed to windows; columns first in every 2-vector.
 
-    `refused` marks windows that show something else than the pattern, moved; None where all are good.
+    `refused` marks windows that show something else than the pattern, moved; None where all are good. `motion` is
+    what the camera may have done between the exposures and is still in `displacement_px`; None where it stood still.
     """
 
     centres_px: Float[np.ndarray, "windows 2"]
@@ -27,6 +29,7 @@ class ShiftMeasurement(eqx.Module):
     information_per_px2: Float[np.ndarray, "windows 2 2"]
     window_px: int = eqx.field(static=True)
     refused: Bool[np.ndarray, " windows"] | None = None
+    motion: CameraMotion | None = None
 
     def at(self, chosen: Bool[np.ndarray, " windows"]) -> "ShiftMeasurement":
         """Only the windows that are chosen."""
@@ -36,6 +39,7 @@ class ShiftMeasurement(eqx.Module):
             self.information_per_px2[chosen],
             self.window_px,
             None if self.refused is None else self.refused[chosen],
+            self.motion,
         )
 
     def good(self) -> "ShiftMeasurement":

@@ -39,7 +39,11 @@ class CameraNoise:
 
 @setting
 class View:
-    """One camera. `frames` are averaged into one image; `f_number` with `focal_m` opens an aperture cone."""
+    """One camera. `frames` are averaged into one image; `f_number` with `focal_m` opens an aperture cone.
+
+    `drift_std_px` is how far the mount may move the picture between two exposures [px at the picture's edge]: one
+    standard deviation each along columns, along rows, of rotation and of magnification; 0 where it stands still.
+    """
 
     name: str = "camera"
     camera: Optics
@@ -47,8 +51,12 @@ class View:
     frames: int = 100
     f_number: float | None = None
     focal_m: float | None = None
+    drift_std_px: float = 1.0
 
     def __post_init__(self) -> None:
+        check_range(
+            "drift_std_px", self.drift_std_px, 0.0, 100.0, "px", "A mount creeps by 0.1 to 1 px in minutes."
+        )
         check_range("frames", self.frames, 1, 1_000_000, "", "One image is the mean of at least one frame.")
         if self.f_number is not None:
             check_range(

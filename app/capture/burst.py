@@ -7,8 +7,8 @@ record, run, judge, origin, keep. A calibration takes its pictures with `shoot`,
 import contextlib
 import signal
 import threading
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,6 +23,7 @@ from drivers.capture import Abort, OnFrame, OnProgress, Taken, run_capture
 from drivers.errors import DeviceSettingError
 from drivers.protocols import Camera
 from drivers.sequence import BurstStart, check_times, evenly, run_sequence
+from drivers.verdict import Verdict
 
 OnAbort = Literal["keep", "discard"]
 
@@ -90,10 +91,13 @@ def take(
     *,
     sequence: dict[str, Any] | None = None,
     name: str | None = None,
+    source: Mapping[str, Any] | None = None,
+    known: tuple[Verdict, ...] = (),
 ) -> TakenBurst:
     """Take one burst into a new folder below captures/, by `name` where that was given out already.
 
-    `sequence` says which burst of how many it is. Raises AirlensError without room for it, DeviceError.
+    `sequence` says which burst of how many it is. `source` says where the frames come from, where that is not the
+    rig; `known` are verdicts that the frames cannot tell. Raises AirlensError without room for it, DeviceError.
     """
     check_room(experiment.folder, plan, camera.info)
     name = name or new_id(experiment.captures_folder, plan.role)
@@ -104,8 +108,11 @@ def take(
         if burst.outcome is BurstOutcome.ABORTED and watch.stop() == "discard":
             recorder.discard()
             return TakenBurst(burst, None)
-        burst = judged(experiment, burst, told)
-        return TakenBurst(burst, recorder.keep(burst, _origin(experiment, plan, told, sequence)))
+        burst = judged(experiment, replace(burst, verdicts=(*burst.verdicts, *known)), told)
+        origin = dict(source) if source is not None else _rig(experiment, plan)
+        origin |= known_pairs(conditions_of(experiment.settings, told))
+        origin |= {} if sequence is None else {"sequence": sequence}
+        return TakenBurst(burst, recorder.keep(burst, origin))
     except BaseException:
         recorder.leave()
         raise
@@ -160,16 +167,10 @@ def _run(camera: Camera, plan: CapturePlan, watch: Watch, keep: OnFrame, rig_on_
     )
 
 
-def _origin(
-    experiment: Experiment, plan: CapturePlan, told: Conditions, sequence: dict[str, Any] | None
-) -> dict[str, Any]:
-    """Where the burst comes from: the rig, what a simulated room did, and the conditions as they are known."""
+def _rig(experiment: Experiment, plan: CapturePlan) -> dict[str, Any]:
+    """Which rig took it, and what a simulated room did."""
     kind = experiment.settings.rig.camera_kind
-    origin: dict[str, Any] = {"rig": kind}
-    if kind == "simulated":
-        origin["air"] = air_of(plan.role)
-    origin |= known_pairs(conditions_of(experiment.settings, told))
-    return origin | ({} if sequence is None else {"sequence": sequence})
+    return {"rig": kind, "air": air_of(plan.role)} if kind == "simulated" else {"rig": kind}
 
 
 @contextlib.contextmanager

@@ -25,6 +25,10 @@ COMMANDS = {
         "app.commands.displacement",
         "Estimate the shift field between two pictures (TIFF or PNG), with its uncertainty.",
     ),
+    "import": (
+        "app.commands.importing",
+        "Make captures of pictures that another camera took: TIFF, PNG, JPEG, or a camera's raw files.",
+    ),
     "jobs": ("app.commands.jobs", "Queue, watch, stop and resume computations."),
     "kiosk": (
         "app.commands.kiosk",

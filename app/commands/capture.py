@@ -91,7 +91,7 @@ def _take(folder: Path, order, on_abort: OnAbort, as_json: bool) -> None:
         )
         taken = take_order(camera, experiment, order, watch)
     for one in taken:
-        typer.echo(json.dumps(_summary(one)) if as_json else _text(one))
+        typer.echo(json.dumps(_summary(one)) if as_json else said(one))
     if not taken or taken[-1].shortfall:
         raise AirlensError(taken[-1].shortfall if taken else "Stopped before the first burst.")
     if len(taken) < order.bursts:
@@ -110,7 +110,8 @@ def _summary(one) -> dict[str, Any]:
     }
 
 
-def _text(one) -> str:
+def said(one) -> str:
+    """A burst in words: where it is, and what is wrong with it."""
     burst = one.burst
     refused = ", ".join(f"{count} {fault}" for fault, count in burst.refused.items()) or "none"
     lines = [f"{one.folder or 'discarded'}: {burst.outcome}, {burst.frames} frames, refused: {refused}"]

@@ -1,6 +1,8 @@
 """The measured shifts of a result on disk: shift-<view>.nc, for the report, the page, and other programs."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -8,6 +10,7 @@ import xarray as xr
 from app.errors import BadInputError
 from app.files.durable import durable_path
 from app.files.reading import reading
+from core.motion import CameraMotion
 from core.problem import ShiftMeasurement
 
 
@@ -29,10 +32,24 @@ def write_shifts(folder: Path, shifts: tuple[ShiftMeasurement, ...]) -> None:
                     {"units": "pixel-2", "long_name": "inverse covariance of the displacement"},
                 ),
             },
-            attrs={"Conventions": "CF-1.11", "window_px": shift.window_px},
+            attrs={"Conventions": "CF-1.11", "window_px": shift.window_px} | _motion_attributes(shift.motion),
         )
         with durable_path(folder / f"shift-{index}.nc") as temporary:
             dataset.to_netcdf(temporary, engine="h5netcdf")
+
+
+def _motion_attributes(motion: CameraMotion | None) -> dict[str, Any]:
+    """The camera's unknown motion: its picture, and the motions of one standard deviation, one after the other."""
+    if motion is None:
+        return {}
+    return {"picture_px": list(motion.size_px), "camera_motions_px": motion.root_px.T.ravel()}
+
+
+def _motion(attributes: Mapping[str, Any]) -> CameraMotion | None:
+    if "camera_motions_px" not in attributes:
+        return None
+    width_px, height_px = (int(v) for v in attributes["picture_px"])
+    return CameraMotion((width_px, height_px), np.reshape(attributes["camera_motions_px"], (4, 4)).T)
 
 
 def read_shifts(folder: Path) -> tuple[ShiftMeasurement, ...]:
@@ -48,6 +65,7 @@ def read_shifts(folder: Path) -> tuple[ShiftMeasurement, ...]:
                     displacement_px=data["displacement"].to_numpy(),
                     information_per_px2=data["information"].to_numpy(),
                     window_px=int(np.asarray(data.attrs["window_px"])),
+                    motion=_motion(data.attrs),
                 )
             )
     if not shifts:

@@ -8,19 +8,16 @@ from scipy.ndimage import uniform_filter
 
 from app.errors import BadInputError
 from app.experiment.captures import Capture, CapturePair
-from core.camera_noise import frame_variance
-from core.displacement import measure_shift, resolve_window_px, window_centres
-from core.drift import Similarity, fit_similarity, move_image, similarity_basis
+from app.reconstruct.drift import Exposures, without_known_drift
+from core.camera_noise import frame_variance, scattered_variance
+from core.displacement import resolve_window_px, window_centres
+from core.drift import Similarity, move_image
 from core.problem import ImagePair, ShiftMeasurement
 from core.rays.visibility import sees_wall
 from core.scene import Scene, View
 from core.window_fit import derivative_filter
 
 Image = Float32[np.ndarray, "rows cols"]
-
-# A drift below this moves no window by more than the noise of a hundred frames.
-_SMALL_DRIFT_PX = 2e-3
-_DRIFT_PASSES = 3
 
 
 @dataclass(frozen=True)
@@ -56,56 +53,37 @@ def measure(captures: CapturePair, scene: Scene) -> Measurement:
 
 def _pair(view: View, index: int, captures: CapturePair, drift: Similarity) -> ImagePair:
     before, after = captures.reference.images[index], captures.flow.images[index]
-    variance = frame_variance(before.mean, view.noise) / before.frames
-    variance += frame_variance(after.mean, view.noise) / after.frames
+    variance = _variance(captures.reference, index, view) + _variance(captures.flow, index, view)
     return ImagePair(move_image(before.mean, drift), after.mean, float(variance.mean()))
+
+
+def _variance(capture: Capture, index: int, view: View) -> np.ndarray:
+    """Variance of the mean picture's pixels: by the calibrated camera, or by the frames of another one."""
+    image = capture.images[index]
+    if capture.manifest.get("origin", {}).get("rig") != "imported" or image.frames < 2:
+        return frame_variance(image.mean, view.noise) / image.frames
+    about = capture.manifest["views"][index]
+    levels = np.array([record["level"] for record in about["records"]])
+    flicker, step = float(levels.std(ddof=1) / max(levels.mean(), 1e-9)), 1.0 / about["full_scale_counts"]
+    return scattered_variance(image.mean, image.std, image.frames, flicker, step) / image.frames
 
 
 def _measure_view(
     scene: Scene, index: int, view: View, reference: Capture, flow: Capture
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     before, after = reference.images[index], flow.images[index]
-    variance = frame_variance(before.mean, view.noise) / before.frames
-    variance += frame_variance(after.mean, view.noise) / after.frames
+    variance = _variance(reference, index, view) + _variance(flow, index, view)
     window_px = resolve_window_px(scene, view)
     # One weight a window: pixel by pixel the darkest would weigh a thousandfold, and with them what the
     # model leaves out there (clipping, aliasing), which biases a drift of 0.1 px by 1 %.
-    variance = uniform_filter(variance, 2 * window_px)
+    exposures = Exposures(before.mean, after.mean, uniform_filter(variance, 2 * window_px), window_px)
     centres = window_centres(before.mean.shape, window_px)
     in_room = sees_wall(scene, index, centres, margin_px=float(window_px))
-    border = ~sees_wall(scene, index, centres, margin_px=-float(window_px)) & _whole(
-        centres, before.mean.shape
+    beyond = ~sees_wall(scene, index, centres, margin_px=-float(window_px))
+    shift, drift, note = without_known_drift(
+        exposures, in_room, beyond & _whole(centres, before.mean.shape), view.drift_std_px
     )
-    if border.mean() < 0.01:
-        shift = measure_shift(before.mean, after.mean, variance, window_px)
-        note = "No part of the picture is free of the room's air: drift between exposures was not removed."
-        return _in_room(shift, in_room, Similarity(), note)
-    moved, drift, shape = before.mean, Similarity(), before.mean.shape
-    for _ in range(_DRIFT_PASSES):
-        rest, _ = _drift_of(
-            measure_shift(moved, after.mean, variance, window_px, follow=False), border, shape
-        )
-        if max(abs(rest.column_px), abs(rest.row_px)) < _SMALL_DRIFT_PX:
-            break
-        drift = rest.after(drift)
-        moved = move_image(before.mean, drift)
-    shift = measure_shift(moved, after.mean, variance, window_px)
-    rest, covariance = _drift_of(shift, border, shape)
-    static = rest.displacement_px(shift.centres_px, shape)
-    shift = replace_displacement(shift, shift.displacement_px - static, covariance, shape)
-    total = rest.after(drift)
-    note = (
-        f"Drift between the exposures, from the border: {total.column_px:+.4f} px across, "
-        f"{total.row_px:+.4f} px down, {1e6 * total.rotation_rad:+.1f} urad; removed."
-    )
-    return _in_room(shift, in_room, total, note)
-
-
-def _drift_of(
-    shift: ShiftMeasurement, border: np.ndarray, shape: tuple[int, int]
-) -> tuple[Similarity, np.ndarray]:
-    """The motion of the border's good windows, and its covariance."""
-    return fit_similarity(shift, border if shift.refused is None else border & ~shift.refused, shape)
+    return _in_room(shift, in_room, drift, note)
 
 
 def _in_room(
@@ -120,16 +98,6 @@ def _in_room(
             "pictures (a person, a reflection, another light), and are left out."
         )
     return shift.good(), drift, note
-
-
-def replace_displacement(
-    shift: ShiftMeasurement, displacement_px: np.ndarray, drift_covariance: np.ndarray, shape: tuple[int, int]
-) -> ShiftMeasurement:
-    """The measurement with another displacement, and the drift's own uncertainty added to it."""
-    basis = similarity_basis(shift.centres_px, shape)
-    added = np.einsum("wap,pq,wbq->wab", basis, drift_covariance, basis, optimize=True)
-    information = np.linalg.inv(np.linalg.inv(shift.information_per_px2) + added)
-    return ShiftMeasurement(shift.centres_px, displacement_px, information, shift.window_px, shift.refused)
 
 
 def _whole(centres_px: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -11,10 +11,12 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 from scipy.interpolate import RegularGridInterpolator
 
-from core.data_error import PLANE_NOISE_K, WALL_MARGIN
+from core.data_error import CORRELATED_DATA, PLANE_NOISE_K, REPRESENTATION, WALL_MARGIN
+from core.drift import nearly_still
 from core.estimate.plane_openings import still_vertices
 from core.geometry import Box, face_of
 from core.known import measured_outlets
+from core.motion import CameraMotion, WithoutMotion, without_motion
 from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.rays.operator import StraightRayOperator, build
 from core.rays.visibility import away_from_walls
@@ -35,17 +37,18 @@ class ShiftBlocks(eqx.Module):
     weight: Float[np.ndarray, "windows 2 2"]
     displacement_px: Float[np.ndarray, "blocks 2"]
     variance_px2: Float[np.ndarray, "blocks 2"]
+    still: WithoutMotion | None = None
 
     def predicted(self, excess_refractivity: Float[Array, "vx vy vz"]) -> Float[np.ndarray, "blocks 2"]:
         """The blocks' shifts for a refractivity on the operator's vertices."""
         return self.pooled(np.asarray(_apply(self.operator, excess_refractivity)))
 
     def pooled(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Float[np.ndarray, "blocks 2"]:
-        """Information-weighted mean of the windows of each block."""
+        """Information-weighted mean of the windows of each block, without what the camera's motion explains."""
         total = np.zeros_like(self.displacement_px)
         used = self.row >= 0
         np.add.at(total, self.row[used], np.einsum("wij,wj->wi", self.weight, displacement_px)[used])
-        return total
+        return total if self.still is None else self.still.apply(total)
 
 
 @eqx.filter_jit
@@ -75,7 +78,18 @@ def shift_blocks(
     blocks = ShiftBlocks(
         operator, row, weight, np.zeros(total.shape[:2]), np.diagonal(covariance, axis1=1, axis2=2).copy()
     )
+    still = None if measured.motion is None else _still(blocks, measured.motion, nearly_still(measured))
+    blocks = eqx.tree_at(lambda b: b.still, blocks, still, is_leaf=lambda leaf: leaf is None)
     return eqx.tree_at(lambda b: b.displacement_px, blocks, blocks.pooled(measured.displacement_px))
+
+
+def _still(blocks: ShiftBlocks, motion: CameraMotion, measured: ShiftMeasurement) -> WithoutMotion:
+    """Takes the camera's motion out of blocks whose errors are their noise and what no grid represents."""
+    moves = motion.at(measured.centres_px)
+    motions = np.stack([blocks.pooled(moves[..., n]) for n in range(moves.shape[2])], axis=-1)
+    size_px = REPRESENTATION * float(np.median(np.abs(blocks.pooled(measured.displacement_px))))
+    variance = CORRELATED_DATA * (blocks.variance_px2 + size_px**2)
+    return without_motion(motions, np.einsum("ba,ac->bac", 1.0 / variance, np.eye(2)))
 
 
 def _block_px(room: Box, operator: StraightRayOperator, measured: ShiftMeasurement) -> float:

@@ -14,7 +14,8 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy import ndimage
 
-from core.losses.shifts import ShiftRows, drift_basis
+from core.losses.shifts import ShiftRows
+from core.motion import CameraMotion
 from core.problem import ImagePair
 from core.rays.operator import build
 from core.render.light import pattern_image, sample_pattern
@@ -27,8 +28,13 @@ from core.window_fit import derivative_filter
 MOST_PIXELS = 300_000
 
 
-def warped_rows(scene: Scene, view: int, pair: ImagePair, shape: tuple[int, int, int]) -> ShiftRows:
-    """One row a pixel, from both measured images. Raises SettingError for a picture that is too large."""
+def warped_rows(
+    scene: Scene, view: int, pair: ImagePair, shape: tuple[int, int, int], motion: CameraMotion
+) -> ShiftRows:
+    """One row a pixel, from both measured images. Raises SettingError for a picture that is too large.
+
+    `motion` is a unit of the camera's unknown motion.
+    """
     rows, cols = pair.reference_image.shape
     if rows * cols > MOST_PIXELS:
         raise SettingError(
@@ -41,10 +47,12 @@ def warped_rows(scene: Scene, view: int, pair: ImagePair, shape: tuple[int, int,
         [ndimage.correlate1d(mean, taps, axis=axis, mode="nearest").ravel() for axis in (1, 0)], axis=1
     )
     difference = (pair.flow_image - pair.reference_image).ravel()
-    return _rows(scene, view, shape, pixel_centres(rows, cols), gradient, difference, pair, 1)
+    return _rows(scene, view, shape, pixel_centres(rows, cols), gradient, difference, pair, motion, 1)
 
 
-def rendered_rows(scene: Scene, view: int, pair: ImagePair, shape: tuple[int, int, int]) -> ShiftRows:
+def rendered_rows(
+    scene: Scene, view: int, pair: ImagePair, shape: tuple[int, int, int], motion: CameraMotion
+) -> ShiftRows:
     """One row a pixel, the mean of its samples at the positions that the images were rendered at."""
     if pair.sample_offsets_px is None:
         raise SettingError(
@@ -58,9 +66,8 @@ def rendered_rows(scene: Scene, view: int, pair: ImagePair, shape: tuple[int, in
     luminance, gradient = _model(jnp.asarray(pattern_image(scene)), geometry)
     reference = np.asarray(luminance, np.float64).reshape(-1, samples).mean(1)
     difference = pair.flow_image.ravel() - reference
-    return _rows(
-        scene, view, shape, positions, np.asarray(gradient, np.float64) / samples, difference, pair, samples
-    )
+    slopes = np.asarray(gradient, np.float64) / samples
+    return _rows(scene, view, shape, positions, slopes, difference, pair, motion, samples)
 
 
 @eqx.filter_jit
@@ -84,15 +91,15 @@ def _rows(
     gradient: Float[np.ndarray, "positions 2"],
     difference: Float[np.ndarray, " rows"],
     pair: ImagePair,
+    motion: CameraMotion,
     samples: int,
 ) -> ShiftRows:
-    camera = scene.views[view].camera
     std = pair.difference_variance**0.5
     return ShiftRows(
         build(scene, view, positions, shape),
         jnp.asarray(-gradient[:, None, :] / std, jnp.float32),
         jnp.asarray(difference[:, None] / std, jnp.float32),
-        jnp.asarray(drift_basis(positions, (camera.width_px, camera.height_px))),
+        jnp.asarray(motion.at(positions), jnp.float32),
         samples,
     )
 

@@ -182,17 +182,17 @@ class SmoothnessLoss(eqx.Module):
 
 
 class PriorLoss(eqx.Module):
-    """Priors: drift and learned transport are zero, within one standard deviation."""
+    """Priors: drift and learned transport are zero, within one standard deviation; the drift's is one a view."""
 
-    drift_std_px: float = eqx.field(static=True, default=0.3)
+    drift_std: tuple[float, ...] = eqx.field(static=True, default=())
     log_transport_std: float = eqx.field(static=True, default=1.0)
     name: str = eqx.field(static=True, default="prior")
 
     def rows(self, fields: Fields, unknowns: Unknowns, key: PRNGKeyArray | None) -> Rows:
         """One row for each unknown, weighted against losses that are means."""
         rows = []
-        if unknowns.drift_px is not None:
-            rows.append(1e-2 * unknowns.drift_px / self.drift_std_px)
+        if unknowns.drift is not None:
+            rows.append(1e-2 * unknowns.drift / jnp.asarray(self.drift_std)[:, None])
         if unknowns.log_transport is not None:
             rows.append(1e-1 * unknowns.log_transport / self.log_transport_std)
         return tuple(rows)

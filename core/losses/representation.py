@@ -44,15 +44,14 @@ class Representation(Protocol):
 class Unknowns(eqx.Module):
     """All unknowns of a solve: a representation, and what the scene leaves open besides.
 
-    `drift_px`: a similarity of each view's pattern in the picture (camera and projector together; they
-    are the same four numbers to first order when the wall is seen face-on): move along columns and
-    rows, rotation and magnification, each as the largest displacement in px that it causes.
+    `drift`: a motion of each view's picture (camera and projector together; they are the same four numbers to first
+    order when the wall is seen face-on), in the units of the losses' `motions`.
     `log_transport`: logarithms of learned factors on viscosity and diffusivity.
     None where a scene does not ask for it.
     """
 
     representation: Representation
-    drift_px: Float[Array, "views 4"] | None = None
+    drift: Float[Array, "views 4"] | None = None
     log_transport: Float[Array, "2"] | None = None
 
 

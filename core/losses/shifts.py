@@ -19,7 +19,6 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from core.air import Air
-from core.drift import similarity_basis
 from core.losses.boussinesq import Scales
 from core.losses.physics import Rows
 from core.losses.representation import Fields, Spans, Unknowns
@@ -28,21 +27,24 @@ from core.rays.operator import StraightRayOperator
 
 
 class ShiftRows(eqx.Module):
-    """Rows of one view. `samples` consecutive positions are added up to one row (one pixel)."""
+    """Rows of one view. `samples` consecutive positions are added up to one row (one pixel).
+
+    `motions` are what a unit of each of the camera's motions does at the positions.
+    """
 
     operator: StraightRayOperator
     matrix: Float[Array, "positions k 2"]
     target: Float[Array, "rows k"]
-    similarity: Float[Array, "positions 2 4"]
+    motions: Float[Array, "positions 2 4"]
     samples: int = eqx.field(static=True, default=1)
 
     def errors(
-        self, excess: Float[Array, "nx ny nz"], drift_px: Float[Array, "4"] | None
+        self, excess: Float[Array, "nx ny nz"], drift: Float[Array, "4"] | None
     ) -> Float[Array, "rows k"]:
         """Model minus measurement, over the noise."""
         shift = self.operator.apply(excess)
-        if drift_px is not None:
-            shift = shift + self.similarity @ drift_px
+        if drift is not None:
+            shift = shift + self.motions @ drift
         seen = jnp.einsum("pki,pi->pk", self.matrix, shift)
         return seen.reshape(-1, self.samples, seen.shape[1]).sum(1) - self.target
 
@@ -54,7 +56,7 @@ class ShiftRows(eqx.Module):
             self.operator.chosen(positions),
             self.matrix[positions],
             self.target[rows],
-            self.similarity[positions],
+            self.motions[positions],
             self.samples,
         )
 
@@ -78,7 +80,7 @@ class ShiftLoss(eqx.Module):
         excess = self.air.excess_refractivity(excess_k)
         found = []
         for place, view in enumerate(self.views):
-            drift = None if unknowns.drift_px is None else unknowns.drift_px[place]
+            drift = None if unknowns.drift is None else unknowns.drift[place]
             if key is not None:
                 count = view.target.shape[0]
                 own = jax.random.fold_in(key, place)
@@ -95,25 +97,20 @@ class ShiftLoss(eqx.Module):
 def displacement_rows(
     shift: ShiftMeasurement,
     operator: StraightRayOperator,
-    similarity: Float[np.ndarray, "windows 2 4"],
+    motions: Float[np.ndarray, "windows 2 4"],
     model_std_px: float,
 ) -> ShiftRows:
     """Rows of windows: W^(1/2) (d − d_measured), W the inverse of noise plus model covariance.
 
-    `model_std_px` is what the grid or the ray model cannot represent of a shift.
+    `motions` are what a unit of each of the camera's motions does. `model_std_px` is what the grid or the ray model
+    cannot represent of a shift.
     """
     covariance = np.linalg.inv(shift.information_per_px2) + model_std_px**2 * np.eye(2)
     root = np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1)
     target = np.einsum("wki,wi->wk", root, shift.displacement_px)
     return ShiftRows(
-        operator, jnp.asarray(root, jnp.float32), jnp.asarray(target, jnp.float32), jnp.asarray(similarity)
+        operator,
+        jnp.asarray(root, jnp.float32),
+        jnp.asarray(target, jnp.float32),
+        jnp.asarray(motions, jnp.float32),
     )
-
-
-def drift_basis(
-    centres_px: Float[np.ndarray, "positions 2"], size_px: tuple[int, int]
-) -> Float[np.ndarray, "positions 2 4"]:
-    """`similarity_basis` with rotation and magnification scaled to 1 px at the picture's edge (see `Unknowns`)."""
-    half = max(size_px) / 2
-    scale = np.array([1.0, 1.0, half, half])
-    return (similarity_basis(centres_px, (size_px[1], size_px[0])) / scale).astype(np.float32)

@@ -58,7 +58,10 @@ class RepresentedAir(AbstractField):
 
 
 class RenderedRows(eqx.Module):
-    """A view's picture, rendered at the samples of the measured one: (I_model − I_flow) / σ."""
+    """A view's picture, rendered at the samples of the measured one: (I_model − I_flow) / σ.
+
+    Only a simulation knows those samples, and its camera stands still: there is no drift.
+    """
 
     geometry: PixelGeometry
     pattern: Float[Array, "rows cols"]
@@ -71,7 +74,9 @@ class RenderedRows(eqx.Module):
         """Pixels."""
         return self.flow.shape[0]
 
-    def errors(self, chosen: Array, air: RepresentedAir, tracer: QuasiLinearTracer) -> Float[Array, " some"]:
+    def errors(
+        self, chosen: Array, air: RepresentedAir, tracer: QuasiLinearTracer, drift: Float[Array, "4"] | None
+    ) -> Float[Array, " some"]:
         """Of some pixels, over the noise."""
         geometry = _chosen(self.geometry, chosen, self.samples)
         shift_px = pattern_offset_px(geometry, wall_offset_m(geometry, air, tracer))
@@ -86,16 +91,21 @@ class TracedWindows(eqx.Module):
     seen_from_wall: Float[Array, "windows 2 3"]
     root: Float[Array, "windows 2 2"]
     target: Float[Array, "windows 2"]
+    motions: Float[Array, "windows 2 4"]
 
     @property
     def count(self) -> int:
         """Windows."""
         return self.target.shape[0]
 
-    def errors(self, chosen: Array, air: RepresentedAir, tracer: QuasiLinearTracer) -> Float[Array, "some 2"]:
+    def errors(
+        self, chosen: Array, air: RepresentedAir, tracer: QuasiLinearTracer, drift: Float[Array, "4"] | None
+    ) -> Float[Array, "some 2"]:
         """Of some windows, over the noise."""
         offset_m = wall_offset_m(_chosen(self.geometry, chosen, 1), air, tracer)
         shift_px = jnp.einsum("wij,wj->wi", self.seen_from_wall[chosen], offset_m)
+        if drift is not None:
+            shift_px = shift_px + self.motions[chosen] @ drift
         return jnp.einsum("wki,wi->wk", self.root[chosen], shift_px) - self.target[chosen]
 
 
@@ -112,12 +122,7 @@ class TracedLoss(eqx.Module):
     name: str = eqx.field(static=True, default="bos")
 
     def rows(self, fields: Fields, unknowns: Unknowns, key: PRNGKeyArray | None) -> Rows:
-        """All rows, or a random choice. Raises SettingError for a drift, which the paper does not have."""
-        if unknowns.drift_px is not None:
-            raise SettingError(
-                "Rays through the network do not solve for a drift along; take rays = 'grid', or remove the "
-                "drift from the pictures first (drift_std_px = None)."
-            )
+        """All rows, or a random choice."""
         air = RepresentedAir(fields, self.scales, self.air, self.origin_m)
         tracer = QuasiLinearTracer(self.steps, self.air.ambient_refractivity)
         found = []
@@ -126,7 +131,8 @@ class TracedLoss(eqx.Module):
             if key is not None:
                 own = jax.random.fold_in(key, place)
                 chosen = jax.random.randint(own, (min(self.pixels, view.count),), 0, view.count)
-            errors = view.errors(chosen, air, tracer)
+            drift = None if unknowns.drift is None else unknowns.drift[place]
+            errors = view.errors(chosen, air, tracer, drift)
             found.append((self.weight / (errors.size * len(self.views))) ** 0.5 * errors)
         return tuple(found)
 
@@ -154,8 +160,14 @@ def rendered_view(scene: Scene, view: int, pair: ImagePair) -> RenderedRows:
     )
 
 
-def traced_windows(scene: Scene, view: int, shift: ShiftMeasurement, model_std_px: float) -> TracedWindows:
-    """Windows with the inverse of noise plus model covariance as their weight."""
+def traced_windows(
+    scene: Scene,
+    view: int,
+    shift: ShiftMeasurement,
+    model_std_px: float,
+    motions: Float[np.ndarray, "windows 2 4"],
+) -> TracedWindows:
+    """Windows with the inverse of noise plus model covariance as weight; `motions` as in `displacement_rows`."""
     geometry = pixel_geometry(scene, view, shift.centres_px)
     pattern_from_pixel = np.asarray(geometry.pattern_from_pixel, np.float64)
     unlit = np.abs(pattern_from_pixel).sum((1, 2)) == 0
@@ -164,7 +176,7 @@ def traced_windows(scene: Scene, view: int, shift: ShiftMeasurement, model_std_p
     covariance = np.linalg.inv(shift.information_per_px2) + model_std_px**2 * np.eye(2)
     root = np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1)
     target = np.einsum("wki,wi->wk", root, shift.displacement_px)
-    return TracedWindows(geometry, *(jnp.asarray(a, jnp.float32) for a in (seen, root, target)))
+    return TracedWindows(geometry, *(jnp.asarray(a, jnp.float32) for a in (seen, root, target, motions)))
 
 
 def _chosen(geometry: PixelGeometry, pixels: Array, samples: int) -> PixelGeometry:

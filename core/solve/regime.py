@@ -7,11 +7,13 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from core.data_error import WALL_MARGIN
+from core.drift import nearly_still
 from core.losses.boundary_loss import boundary_loss, level_loss, point_losses
 from core.losses.image_rows import pixel_centres, rendered_rows, warped_rows
 from core.losses.physics import Loss, PhysicsLoss, PriorLoss, SmoothnessLoss
-from core.losses.shifts import ShiftLoss, ShiftRows, displacement_rows, drift_basis
+from core.losses.shifts import ShiftLoss, ShiftRows, displacement_rows
 from core.losses.traced import TracedLoss, rendered_view, traced_windows
+from core.motion import CameraMotion
 from core.problem import ImagePair, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.rays.visibility import away_from_walls
@@ -49,13 +51,12 @@ class DataModel:
     `representation` is the part of the shifts' size that the model's grid cannot hold, added to the
     noise. Windows whose shift is `outlier` times the typical one (a thermal layer beside a wall, thinner
     than a cell) are left out, and so are those within `margin` of the room's size from a side wall, floor
-    or ceiling. `drift_std_px` is None where the images are known to be still.
+    or ceiling.
     """
 
     representation: float = 0.1
     outlier: float = 6.0
     margin: float = WALL_MARGIN
-    drift_std_px: float | None = None
 
 
 def losses_of(
@@ -91,8 +92,9 @@ def losses_of(
         losses.append(level)
     if "pde" in regime:
         losses.append(PhysicsLoss(frame.numbers, frame.lower, frame.upper, weights.pde, weights.gamma))
-    if data.drift_std_px is not None or problem.scene.flow.transport == "learned":
-        losses.append(PriorLoss(drift_std_px=data.drift_std_px or 0.3))
+    if moved(problem) or problem.scene.flow.transport == "learned":
+        units = tuple(_unit(nearly_still(shift)) for shift in problem.shifts)
+        losses.append(PriorLoss(tuple(1.0 / unit for unit in units)))
     return tuple(losses)
 
 
@@ -114,7 +116,7 @@ def image_loss(
         case "rendered" | "warped" as term:
             rows = rendered_rows if term == "rendered" else warped_rows
             views = [
-                _inner(rows(scene, v, pair, shape), scene, v, pair, data)
+                _inner(rows(scene, v, pair, shape, _motion_of(problem, v)), scene, v, pair, data)
                 for v, pair in enumerate(problem.images)
             ]
         case _:
@@ -142,25 +144,47 @@ def _inner(rows: ShiftRows, scene: Scene, view: int, pair: ImagePair, data: Data
 
 
 def _windows(problem: Problem, view: int, data: DataModel, shape: tuple[int, int, int]) -> ShiftRows:
-    kept, model_std_px = _kept_windows(problem, view, data)
-    camera = problem.scene.views[view].camera
+    kept, model_std_px, motions = _kept_windows(problem, view, data)
     operator = build(problem.scene, view, kept.centres_px, shape, window_px=float(kept.window_px))
-    basis = drift_basis(kept.centres_px, (camera.width_px, camera.height_px))
-    return displacement_rows(kept, operator, basis, model_std_px)
+    return displacement_rows(kept, operator, motions, model_std_px)
 
 
-def _kept_windows(problem: Problem, view: int, data: DataModel) -> tuple[ShiftMeasurement, float]:
-    """Windows that the grid can represent, and the representation error in px."""
-    shift = problem.shifts[view]
+def moved(problem: Problem) -> bool:
+    """Whether the camera may have moved between the exposures."""
+    return any(shift.motion is not None for shift in problem.shifts)
+
+
+def _unit(shift: ShiftMeasurement) -> float:
+    """The unit of the unknown motion in its standard deviations: at most about the size of the shifts.
+
+    A descent by gradients takes steps of one size in all unknowns.
+    """
+    if shift.motion is None:
+        return 1.0
+    typical_px = float(np.median(np.linalg.norm(shift.displacement_px, axis=1)))
+    return min(1.0, typical_px / max(float(np.abs(shift.motion.root_px).max()), 1e-12))
+
+
+def _motion_of(problem: Problem, view: int) -> CameraMotion:
+    """What a unit of the view's unknown motion is; nothing where the camera stood still."""
+    camera = problem.scene.views[view].camera
+    root_px = np.zeros((4, 4))
+    if view < len(problem.shifts):
+        shift = nearly_still(problem.shifts[view])
+        if shift.motion is not None:
+            root_px = _unit(shift) * shift.motion.root_px
+    return CameraMotion((camera.width_px, camera.height_px), root_px)
+
+
+def _kept_windows(
+    problem: Problem, view: int, data: DataModel
+) -> tuple[ShiftMeasurement, float, Float[np.ndarray, "windows 2 4"]]:
+    """Windows that the grid can represent, the representation error in px, and what units of motion do to them."""
+    shift = nearly_still(problem.shifts[view])
     used, model_std_px = _usable(shift, data)
     used = _away_from_walls(problem.scene, view, shift.centres_px, data.margin, used)
-    kept = ShiftMeasurement(
-        shift.centres_px[used],
-        shift.displacement_px[used],
-        shift.information_per_px2[used],
-        shift.window_px,
-    )
-    return kept, model_std_px
+    kept = shift.at(used)
+    return kept, model_std_px, _motion_of(problem, view).at(kept.centres_px)
 
 
 def _usable(shift: ShiftMeasurement, data: DataModel) -> tuple[np.ndarray, float]:

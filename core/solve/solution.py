@@ -58,7 +58,6 @@ def _learned(unknowns: Unknowns, frame: Frame) -> tuple[str, ...]:
         )
     else:
         notes.append(f"Transport as given: Re {numbers.reynolds:.4g}, Pe {numbers.peclet:.4g}.")
-    if unknowns.drift_px is not None:
-        drift = ", ".join(f"{v:.2g}" for v in np.asarray(unknowns.drift_px).ravel())
-        notes.append(f"Drift solved along (columns, rows, rotation, magnification): {drift} px.")
+    if unknowns.drift is not None:
+        notes.append("The motion of the camera between the exposures was solved for together with the air.")
     return tuple(notes)

@@ -23,6 +23,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
 from core.air import Air
+from core.drift import nearly_still
 from core.known_temperature import VertexGrid, known_temperature
 from core.problem import Problem, ShiftMeasurement
 from core.result import Outcome, Solution
@@ -47,6 +48,7 @@ from core.solve.draft.temperature_system import (
     linear_operator,
     preconditioner,
     steepest_slopes,
+    without_drift,
 )
 from core.watch import Row, Watch
 
@@ -72,9 +74,9 @@ def solve_temperature(
     """Temperature on `grid`; one operator a view. Raises SettingError for contradictory knowledge."""
     started = time.perf_counter()
     air = problem.scene.air
-    system, prior = _system(problem, operators, grid, settings)
+    system, prior, shifts = _system(problem, operators, grid, settings)
     inverse = preconditioner(system)
-    n, history, settled = _minimise(system, inverse, problem.shifts, prior, air, settings, watch)
+    n, history, settled = _minimise(system, inverse, shifts, prior, air, settings, watch)
     doubted = system.with_fewer_data(settings.together * _paths(problem) ** 2)
     rough = preconditioner(doubted)
 
@@ -123,8 +125,8 @@ def _thinnest(air: Air) -> float:
 
 def _system(
     problem: Problem, operators: tuple[ShiftOperator, ...], grid: VertexGrid, settings: TemperatureSettings
-) -> tuple[System, Volume]:
-    """The quadratic problem, and the prior as excess refractivity."""
+) -> tuple[System, Volume, tuple[ShiftMeasurement, ...]]:
+    """The quadratic problem, the prior as excess refractivity, and the shifts without the camera's motion."""
     air = problem.scene.air
     known = known_temperature(problem, grid)
     if not known.mask.any() and not known.means:
@@ -137,15 +139,19 @@ def _system(
     prior_k = prior_temperature(problem, grid)
     prior = excess(air, prior_k + level_k(known, prior_k) - air.ambient_temperature_k)
     representation = _paths(problem) * settings.representation
-    weights = tuple(data_weight(s, representation) for s in problem.shifts)
-    size = prior_size(operators, weights, problem.shifts, prior, grid, settings)
+    weights = tuple(data_weight(nearly_still(s), representation) for s in problem.shifts)
+    rays = operators
+    still = [without_drift(*of) for of in zip(rays, problem.shifts, weights, strict=True)]
+    operators, shifts = tuple(operator for operator, _ in still), tuple(shift for _, shift in still)
+    size = prior_size(operators, weights, shifts, prior, grid, settings)
     # A room's worth of independent values: one a hundred vertices.
     mass = 0.01 / size**2
     lengths = lengths_m(grid, settings)
     stiff = [mass * (length / h) ** 2 for length, h in zip(lengths, grid.spacing_m, strict=True)]
-    return System(
+    system = System(
         grid,
         operators,
+        rays,
         weights,
         known,
         per_k,
@@ -153,7 +159,8 @@ def _system(
         mass=mass,
         slopes=steepest_slopes(problem.scene),
         profile=None if problem.planes else profile_weight(per_k * profile_range_k(problem), grid),
-    ), prior
+    )
+    return system, prior, shifts
 
 
 def _paths(problem: Problem) -> float:

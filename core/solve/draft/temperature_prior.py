@@ -11,7 +11,7 @@ from jaxtyping import Float
 from scipy.ndimage import gaussian_filter
 
 from core.air import Air
-from core.data_error import CORRELATED_DATA
+from core.data_error import CORRELATED_DATA, REPRESENTATION
 from core.geometry import face_of
 from core.known_temperature import KnownTemperature, VertexGrid, known_temperature, plane_on_grid
 from core.problem import Problem, ShiftMeasurement
@@ -39,7 +39,7 @@ class TemperatureSettings:
 
     across: float = 0.04
     along: float = 0.5
-    representation: float = 0.3
+    representation: float = REPRESENTATION
     tolerance: float = 1e-3
     max_iterations: int = 400
     draws: int = 6

@@ -13,6 +13,8 @@ from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator
 
 from core.known_temperature import KnownTemperature, VertexGrid
+from core.motion import WithoutMotion, without_motion
+from core.problem import ShiftMeasurement
 from core.scene import Scene
 
 Volume = Float[np.ndarray, "nx ny nz"]
@@ -37,6 +39,8 @@ class System:
 
     grid: VertexGrid
     operators: tuple[ShiftOperator, ...]
+    # The same before the camera's motion is taken out, which the preconditioner does not know.
+    rays: tuple[ShiftOperator, ...]
     weights: tuple[Float[np.ndarray, "windows 2 2"], ...]
     known: KnownTemperature
     per_k: float
@@ -78,6 +82,32 @@ class System:
         for operator, weight in zip(self.operators, self.weights, strict=True):
             total += operator.transpose(np.einsum("wab,wb->wa", weight, operator.apply(n)))
         return total
+
+
+@dataclass(frozen=True)
+class StillOperator:
+    """A `ShiftOperator` without what a motion of the camera explains."""
+
+    rays: ShiftOperator
+    still: WithoutMotion
+
+    def apply(self, values: Volume) -> Float[np.ndarray, "windows 2"]:
+        """Displacement [px] of every window."""
+        return self.still.apply(self.rays.apply(values))
+
+    def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Volume:
+        """The transposed map."""
+        return self.rays.transpose(self.still.transpose(displacement_px))
+
+
+def without_drift(
+    operator: ShiftOperator, shift: ShiftMeasurement, weight: Float[np.ndarray, "windows 2 2"]
+) -> tuple[ShiftOperator, ShiftMeasurement]:
+    """The operator and the shifts without the camera's motion, for windows of this weight."""
+    if shift.motion is None:
+        return operator, shift
+    still = without_motion(shift.motion.at(shift.centres_px), weight)
+    return StillOperator(operator, still), replace(shift, displacement_px=still.apply(shift.displacement_px))
 
 
 def preconditioner(system: System) -> LinearOperator:
@@ -193,7 +223,7 @@ def _slab_levers(system: System) -> Float[np.ndarray, "ny ny"]:
     """Hessian of the data for a unit gradient across the view, slab by slab along y, a vertex of the face."""
     shape, spacing = system.grid.shape, system.grid.spacing_m
     total = np.zeros((shape[1], shape[1]))
-    for operator, weight in zip(system.operators, system.weights, strict=True):
+    for operator, weight in zip(system.rays, system.weights, strict=True):
         shifts = []
         for j in range(shape[1]):
             ramp = np.zeros(shape)

@@ -26,7 +26,7 @@ from core.solve.check import check_problem
 from core.solve.grid.gauss_newton import Step, column_scale, gauss_newton_step
 from core.solve.grid.start import starting_flow
 from core.solve.nondimensional import Frame, frame_of
-from core.solve.regime import DataModel, Regime, Weights, losses_of
+from core.solve.regime import DataModel, Regime, Weights, losses_of, moved
 from core.solve.solution import solution_of
 from core.watch import Row, StoppedError, Store, Watch
 
@@ -119,9 +119,7 @@ def initial_unknowns(problem: Problem, frame: Frame, settings: GridSettings) -> 
     x, y, z = (positions(span) for span in spans)
     state = grid.of_fields((x, y, z), starting_flow(problem, frame, spans, settings.regime))
     levels = (*multigrid.levels[:-1], state)
-    drift = None
-    if settings.data.drift_std_px is not None and problem.shifts:
-        drift = jnp.zeros((len(problem.shifts), 4))
+    drift = jnp.zeros((len(problem.shifts), 4)) if moved(problem) else None
     learned = jnp.zeros(2) if problem.scene.flow.transport == "learned" else None
     return Unknowns(MultiGrid(levels, multigrid.grids), drift, learned)
 
@@ -199,7 +197,7 @@ def _at_start(unknowns: Unknowns, settings: GridSettings) -> GridState:
 
 
 def _others(unknowns: Unknowns) -> tuple[Array | None, Array | None]:
-    return unknowns.drift_px, unknowns.log_transport
+    return unknowns.drift, unknowns.log_transport
 
 
 def _record(step: Step, state: GridState, elapsed_s: float, settings: GridSettings) -> Row:

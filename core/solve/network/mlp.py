@@ -27,7 +27,7 @@ from core.solve.check import check_problem
 from core.solve.loop import LoopSettings, run
 from core.solve.network.mlp_start import network_like
 from core.solve.nondimensional import frame_of
-from core.solve.regime import DataModel, Regime, Weights, losses_of
+from core.solve.regime import DataModel, Regime, Weights, losses_of, moved
 from core.solve.solution import solution_of
 from core.watch import Watch
 
@@ -124,11 +124,10 @@ def initial_unknowns(
 ) -> Unknowns:
     """A random network from the loop's seed, and zeros for what else the scene asks for."""
     network = initial_mlp(settings.network, lower, upper, jax.random.key(settings.loop.seed))
-    drifts = settings.data.drift_std_px is not None and problem.shifts
     learned = problem.scene.flow.transport == "learned"
     return Unknowns(
         network,
-        jnp.zeros((len(problem.shifts), 4)) if drifts else None,
+        jnp.zeros((len(problem.shifts), 4)) if moved(problem) else None,
         jnp.zeros(2) if learned else None,
     )
 

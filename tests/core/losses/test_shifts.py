@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from core.geometry import Box, looking_along_y
-from core.losses.shifts import displacement_rows, drift_basis
+from core.losses.shifts import displacement_rows
+from core.motion import edge_basis
 from core.problem import ShiftMeasurement
 from core.rays.operator import build
 from core.scene import FixedTexture, Scene, View
@@ -26,7 +27,7 @@ def measured(drift_px, noise_px, seed=0):
     centres = np.stack([column.ravel(), row.ravel()], axis=1)
     operator = build(SCENE, 0, centres, SHAPE)
     excess = jnp.asarray(1e-6 * rng.standard_normal(SHAPE), jnp.float32)
-    basis = drift_basis(centres, (64, 64))
+    basis = edge_basis(centres, (64, 64))
     exact = np.asarray(jax.jit(lambda o, e: o.apply(e))(operator, excess)) + basis @ np.asarray(drift_px)
     covariance = noise_px**2 * np.array([[1.0, 0.6], [0.6, 2.0]])
     noise = rng.standard_normal(exact.shape) @ np.linalg.cholesky(covariance).T

@@ -49,7 +49,8 @@ def test_rays_through_the_network_see_what_the_vertex_grid_sees(scene):
         jax.jit(lambda o, e: o.apply(e))(build(scene, 0, centres, (41, 41, 41), CELL_PX), excess), np.float64
     )
     information = np.broadcast_to(np.eye(2), (len(centres), 2, 2)).copy()
-    view = traced_windows(scene, 0, ShiftMeasurement(centres, np.zeros_like(centres), information, 1), 0.0)
+    shift = ShiftMeasurement(centres, np.zeros_like(centres), information, 1)
+    view = traced_windows(scene, 0, shift, 0.0, np.zeros((len(centres), 2, 4)))
 
     loss = traced(view)
     (rows,) = jax.jit(lambda u: loss.rows(u.representation, u, None))(Unknowns(air))
@@ -88,12 +89,17 @@ def test_the_rendered_picture_of_the_true_air_is_the_flow_image_and_its_gradient
     assert difference == pytest.approx(expected, rel=0.05)
 
 
-def test_a_drift_and_missing_samples_are_refused():
-    view = traced_windows(
-        PRINT, 0, ShiftMeasurement(np.array([[20.0, 20.0]]), np.zeros((1, 2)), np.eye(2)[None], 1), 0.0
-    )
-    with pytest.raises(SettingError, match="drift"):
-        traced(view).rows(network(), Unknowns(network(), jnp.zeros((1, 4))), None)
+def test_a_motion_of_the_camera_adds_to_the_shift():
+    motions = np.zeros((1, 2, 4))
+    motions[0, :, 0] = (0.5, -0.25)
+    shift = ShiftMeasurement(np.array([[20.0, 20.0]]), np.zeros((1, 2)), np.eye(2)[None], 1)
+    loss, air = traced(traced_windows(PRINT, 0, shift, 0.0, motions)), network()
+    rows = [loss.rows(air, Unknowns(air, jnp.array([[q, 0.0, 0.0, 0.0]])), None)[0] for q in (0.0, 2.0)]
+    weight = (loss.weight / rows[0].size) ** 0.5
+    np.testing.assert_allclose((rows[1] - rows[0]).ravel(), weight * np.array([1.0, -0.5]), rtol=1e-4)
+
+
+def test_missing_samples_are_refused():
     pair = ImagePair(np.zeros((4, 4)), np.zeros((4, 4)), 1.0)
     with pytest.raises(SettingError, match="sample positions"):
         rendered_view(PRINT, 0, pair)

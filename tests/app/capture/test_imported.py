@@ -1,0 +1,130 @@
+"""Pictures of another camera: mean, scatter and count as of a capture; what cannot be is said before anything."""
+
+import cv2
+import numpy as np
+import pytest
+import tifffile
+
+from app.capture.imported import import_pictures
+from app.errors import BadInputError
+from app.experiment.captures import load_capture, newest_pair
+from app.experiment.folder import ExperimentSettings, create_experiment
+from app.reconstruct.measure import measure
+from core.camera_noise import frame_variance, scattered_variance
+from core.scene import CameraNoise, FixedTexture, Scene, SolveModel, View
+from drivers.burst import CaptureRole
+from drivers.shift import shift_image
+from drivers.simulated import SensorNoise, SimulatedCamera
+from tests.app.reconstruct.test_problem import CAMERA, ROOM
+from tests.drivers.scenes import pattern
+
+FRAMES, MOVED_PX = 20, 0.3
+
+
+@pytest.fixture
+def experiment(tmp_path):
+    scene = Scene(
+        room=ROOM, views=(View(camera=CAMERA),), light=FixedTexture(), solve=SolveModel(window_px=16)
+    )
+    return create_experiment(tmp_path / "e", ExperimentSettings(scene=scene))
+
+
+def frames(seed=1, moved=False, bits=16):
+    """Frames of the pattern in 16 bits, or in 8."""
+    picture = pattern()
+    if moved:
+        # Its middle to the right; the border is still.
+        picture[24:72, 40:88] = shift_image(picture, (MOVED_PX, 0.0))[24:72, 40:88]
+    camera = SimulatedCamera(lambda: picture, seed=seed, noise=SensorNoise(10_000.0, 3.0, 64.0, 12))
+    taken = np.stack([camera.follow().pixels for _ in range(FRAMES)])
+    return taken if bits == 16 else (taken >> 4).astype(np.uint8)
+
+
+def written(folder, kind, **options):
+    folder.mkdir()
+    for n, pixels in enumerate(frames(bits=8 if kind == "jpg" else 16, **options)):
+        if kind == "tif":
+            tifffile.imwrite(folder / f"{n:02}.tif", pixels)
+        else:
+            cv2.imwrite(str(folder / f"{n:02}.{kind}"), pixels, [cv2.IMWRITE_JPEG_QUALITY, 95])
+    return str(folder)
+
+
+@pytest.mark.parametrize("kind", ["tif", "png", "pages"])
+def test_mean_scatter_and_count_are_those_of_the_frames(experiment, tmp_path, kind):
+    taken = frames()
+    if kind == "pages":
+        tifffile.imwrite(tmp_path / "all.tif", taken)
+        name = str(tmp_path / "all.tif")
+    else:
+        name = written(tmp_path / "r", kind) + f"/*.{kind}"
+    (one,) = import_pictures(experiment, {"reference": [name]}, bits=12)
+    assert one.folder is not None
+    capture = load_capture(one.folder)
+    assert capture.complete
+    assert capture.images[0].frames == FRAMES
+    np.testing.assert_allclose(capture.images[0].mean, taken.mean(0) / 4095, atol=1e-6)
+    np.testing.assert_allclose(capture.images[0].std, taken.std(0, ddof=1) / 4095, atol=1e-6)
+    assert capture.manifest["origin"]["rig"] == "imported"
+    assert len(capture.manifest["origin"]["files"]) == (1 if kind == "pages" else FRAMES)
+
+
+def test_the_noise_comes_from_the_frames():
+    # Twice the counts an electron, and a light that flickers by 1 %.
+    noise = CameraNoise(full_well_e=5_000.0, read_noise_e=10.0)
+    light = (1 + 0.01 * np.random.default_rng(5).standard_normal(FRAMES)).astype(np.float32)
+    picture = pattern(400, 400, level=0.4, contrast=0.3)
+    sensor = SensorNoise(5_000.0, 10.0, 64.0, 12)
+    scenes = [part * picture for part in light]
+    taken = [SimulatedCamera(lambda v=v: v, seed=n, noise=sensor).follow().pixels for n, v in enumerate(scenes)]
+    mean = (np.mean(taken, 0) / 4095).astype(np.float32)
+    std = (np.std(taken, 0, ddof=1) / 4095).astype(np.float32)
+    found = scattered_variance(mean, std, FRAMES, float(light.std(ddof=1)), 1 / 4095)
+    lit = mean > 0.2
+    np.testing.assert_allclose(found[lit], frame_variance(mean, noise)[lit], rtol=0.06)
+
+
+def test_what_is_imported_is_measured_as_what_is_captured_and_a_jpeg_says_what_it_is(experiment, tmp_path):
+    shifts = {}
+    for kind in ("tif", "jpg"):
+        names: dict[CaptureRole, list[str]] = {
+            "reference": [written(tmp_path / f"{kind}-r", kind)],
+            "flow": [written(tmp_path / f"{kind}-f", kind, seed=2, moved=True)],
+        }
+        taken = import_pictures(experiment, names, bits=12 if kind == "tif" else None)
+        bad = {verdict.name for one in taken for verdict in one.burst.verdicts if not verdict.good}
+        assert ("compression" in bad) == (kind == "jpg")
+        shifts[kind] = measure(newest_pair(experiment), experiment.settings.scene).shifts[0]
+    middle = np.all(np.abs(shifts["tif"].centres_px - [64, 48]) < 9, axis=1)
+    assert shifts["tif"].displacement_px[middle, 0].mean() == pytest.approx(MOVED_PX, abs=0.02)
+    assert shifts["jpg"].displacement_px[middle, 0].mean() == pytest.approx(MOVED_PX, abs=0.08)
+
+
+def test_what_cannot_be_is_said_before_anything_is_kept(experiment, tmp_path):
+    good = written(tmp_path / "good", "png")
+    small = tmp_path / "small"
+    small.mkdir()
+    cv2.imwrite(str(small / "1.png"), np.zeros((10, 10), np.uint8))
+    broken = tmp_path / "broken.png"
+    broken.write_bytes((tmp_path / "good" / "00.png").read_bytes()[:500])
+    text = tmp_path / "notes.txt"
+    text.write_text("no picture")
+    floats = tmp_path / "float.tif"
+    tifffile.imwrite(floats, np.zeros((96, 128)))
+    (tmp_path / "raw.nef").write_bytes(b"II*\0")
+    table: list[tuple[dict[CaptureRole, list[str]], int | None, str]] = [
+        ({}, None, "No picture was given"),
+        ({"reference": [str(tmp_path / "nothing*.png")]}, None, "There is no picture"),
+        ({"reference": [str(text)]}, None, "no picture that can be read"),
+        ({"reference": [str(broken)]}, None, "broken.png"),
+        ({"reference": [str(floats)]}, None, "8 or 16 bits"),
+        ({"reference": [good], "flow": [good]}, None, "named as reference and as flow"),
+        ({"reference": [good, good]}, None, "named twice"),
+        ({"reference": [good], "flow": [str(small)]}, None, "128 x 96 px"),
+        ({"reference": [good]}, 8, "8 bits hold at most 255"),
+        ({"reference": [str(tmp_path / "raw.nef")]}, None, "raw"),
+    ]
+    for names, bits, words in table:
+        with pytest.raises(BadInputError, match=words):
+            import_pictures(experiment, names, bits)
+    assert not experiment.captures_folder.exists() or not list(experiment.captures_folder.iterdir())

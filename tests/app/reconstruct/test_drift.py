@@ -1,0 +1,76 @@
+"""Where the camera's motion is read off: a border that is still, and one that the room's air is before."""
+
+import numpy as np
+from scipy import ndimage
+
+from app.reconstruct.drift import Exposures, without_known_drift
+from core.displacement import window_centres
+from core.motion import edge_basis
+from tests.core.test_displacement import band_limited
+
+SHAPE, WINDOW_PX, NOISE = (224, 256), 16, 2e-3
+CREEP_PX = np.array([0.12, -0.2, 0.05, 0.02])
+CENTRES = window_centres(SHAPE, WINDOW_PX)
+SIZE_PX = (SHAPE[1], SHAPE[0])
+BEYOND = np.any((CENTRES < 48) | (CENTRES > np.array(SIZE_PX) - 48), axis=1) & np.all(
+    (CENTRES > 16) & (CENTRES < np.array(SIZE_PX) - 16), axis=1
+)
+
+
+def exposures(seed, air_px, textured=True):
+    """Two noisy pictures; the second one moved by the mount, and by air whose shift is `air_px(x, y)`."""
+    rng, picture = np.random.default_rng(seed), band_limited(SHAPE, seed, shortest_px=5.0)
+    row, column = np.indices(SHAPE, dtype=float)
+    points = np.stack([column.ravel(), row.ravel()], 1)
+    moved = (edge_basis(points, SIZE_PX) @ CREEP_PX).T.reshape(2, *SHAPE)
+    moved = moved + np.array(air_px(column / SHAPE[1], row / SHAPE[0]))
+    after = ndimage.map_coordinates(picture, [row - moved[1], column - moved[0]], order=5, mode="nearest")
+    if not textured:
+        bare = ~((row > 56) & (row < SHAPE[0] - 56) & (column > 56) & (column < SHAPE[1] - 56))
+        picture, after = np.where(bare, 0.5, picture), np.where(bare, 0.5, after)
+    before, after = (p + NOISE * rng.standard_normal(SHAPE) for p in (picture, after))
+    variance = np.full(SHAPE, 2 * NOISE**2, np.float32)
+    return Exposures(before.astype(np.float32), after.astype(np.float32), variance, WINDOW_PX)
+
+
+def still_air(x, y):
+    inside = np.exp(-20 * ((x - 0.5) ** 2 + (y - 0.5) ** 2))
+    return 0.02 * inside * np.sin(20 * x), 0.02 * inside * np.cos(15 * y)
+
+
+def air_everywhere(x, y):
+    return 0.05 * np.sin(12 * x) * np.cos(6 * y), 0.05 * np.cos(9 * y + 4 * x)
+
+
+def drift_of(pictures):
+    return without_known_drift(pictures, ~BEYOND, BEYOND, 1.0)
+
+
+def test_a_still_border_gives_the_creep_and_one_behind_air_is_refused():
+    for seed in range(6):
+        shift, drift, note = drift_of(exposures(seed, still_air))
+        assert "from the border" in note
+        found = [drift.column_px, drift.row_px, drift.rotation_rad * 128, drift.dilation * 128]
+        np.testing.assert_allclose(found, CREEP_PX, atol=4e-3)
+        assert shift.motion is not None
+        assert 1e-5 < np.abs(shift.motion.root_px).max() < 3e-3
+
+        shift, drift, note = drift_of(exposures(seed, air_everywhere))
+        assert "not still" in note
+        assert drift.column_px == 0.0
+        assert shift.motion is not None
+        np.testing.assert_allclose(shift.motion.root_px, np.eye(4))
+
+
+def test_a_bare_border_says_nothing_and_the_creep_stays_in_the_shifts():
+    shift, _, note = drift_of(exposures(1, still_air, textured=False))
+    assert "No part of the picture" in note
+    inner = np.all(np.abs(CENTRES - np.array(SIZE_PX) / 2) < 40, axis=1)
+    expected = edge_basis(CENTRES[inner], SIZE_PX) @ CREEP_PX
+    np.testing.assert_allclose(shift.displacement_px[inner].mean(0), expected.mean(0), atol=0.02)
+
+
+def test_a_camera_that_is_stated_to_stand_still_is_believed_where_nothing_says_otherwise():
+    shift, _, note = without_known_drift(exposures(2, still_air), ~BEYOND, BEYOND & False, 0.0)
+    assert "stand still" in note
+    assert shift.motion is None
