@@ -25,6 +25,10 @@ COMMANDS = {
         "app.commands.displacement",
         "Estimate the shift field between two pictures (TIFF or PNG), with its uncertainty.",
     ),
+    "indoor": (
+        "app.commands.indoor",
+        "Say what the found air means for people and ventilation: draught, PMV, air change, heat, with intervals.",
+    ),
     "jobs": ("app.commands.jobs", "Queue, watch, stop and resume computations."),
     "kiosk": (
         "app.commands.kiosk",

@@ -51,6 +51,13 @@ class FaceFlow(eqx.Module):
         return x[:, None, None] * y[:, None] * z
 
     @property
+    def speed_m_s(self) -> Cells:
+        """Speed of the mean flow in each cell."""
+        areas = [self.volumes_m3[0, 0, 0] / (axis[1] - axis[0]) for axis in self.axes_m]
+        parts = [corner_mean(q, (a,)) / areas[a] for a, q in enumerate(self.flow_m3_s)]
+        return np.linalg.norm(np.stack(parts), axis=0)
+
+    @property
     def entering_m3_s(self) -> float:
         """All air that enters the room; as much leaves."""
         return float(sum(np.maximum(self.inward(face_of(wall)), 0.0).sum() for wall in WALLS))
@@ -61,7 +68,15 @@ class FaceFlow(eqx.Module):
 
 
 def face_flow(solution: Solution, openings: Sequence[Patch] = (), cells: int | None = None) -> FaceFlow:
-    """The solution's flow through the faces between its vertices, or through at most so many `cells` an axis.
+    """The solution's flow, conserved, through the faces between its vertices, or on at most so many `cells` an axis.
+
+    Raises SettingError as `found_flow` does.
+    """
+    return conserved(found_flow(solution, openings), cells)
+
+
+def found_flow(solution: Solution, openings: Sequence[Patch] = ()) -> FaceFlow:
+    """What passes the faces between the solution's vertices as it was found; as much leaves the room as enters it.
 
     Air passes walls within a cell around `openings`, and anywhere where there are none. Raises SettingError for a
     solution without velocity, or with none through its walls.
@@ -73,8 +88,15 @@ def face_flow(solution: Solution, openings: Sequence[Patch] = (), cells: int | N
     for wall in WALLS:
         face = face_of(wall)
         (x, y, z)[face.axis][_plane(face)] *= _open(axes, face, openings)
-    balanced = FaceFlow(axes, _balanced((x, y, z), axes))
-    return _conserved(balanced if cells is None else _coarser(balanced, cells))
+    return FaceFlow(axes, _balanced((x, y, z), axes))
+
+
+def conserved(found: FaceFlow, cells: int | None = None) -> FaceFlow:
+    """The flow after the least change of inner faces with which every cell passes on what it gets.
+
+    On at most so many `cells` an axis; what passes their faces is exact.
+    """
+    return _conserved(found if cells is None else _coarser(found, cells))
 
 
 def _coarser(flow: FaceFlow, cells: int) -> FaceFlow:
@@ -93,8 +115,8 @@ def _coarser(flow: FaceFlow, cells: int) -> FaceFlow:
 def corner_mean(values: Values, axes: Sequence[int] = (0, 1, 2)) -> Values:
     """Mean of neighbouring vertices along these axes: cells, or faces."""
     for a in axes:
-        size = values.shape[a]
-        values = 0.5 * (values.take(range(size - 1), axis=a) + values.take(range(1, size), axis=a))
+        before = (slice(None),) * a
+        values = 0.5 * (values[(*before, slice(None, -1))] + values[(*before, slice(1, None))])
     return values
 
 

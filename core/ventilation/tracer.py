@@ -12,16 +12,17 @@ from typing import Any
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Float
 from scipy import sparse
 from scipy.sparse import linalg
 
 from core.setting import SettingError
-from core.ventilation.face_flow import Cells, FaceFlow
+from core.ventilation.face_flow import Axis, Cells, FaceFlow
 
 TURBULENT_SCHMIDT = 0.85
 MOLECULAR_M2_S = 2.1e-5
 TOLERANCE = 1e-8
+# So many cells are solved for at once, without iterations.
+_FEW = 2000
 # Of an incomplete factorisation; the order and the pivots are those of a nearly symmetric matrix.
 _FACTORS: dict[str, Any] = {
     "drop_tol": 3e-2, "fill_factor": 4.0, "permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0,
@@ -52,17 +53,18 @@ class Tracer(eqx.Module):
 def tracer(flow: FaceFlow, diffusivity_m2_s: Cells) -> Tracer:
     """The transport of a scalar by `flow` and `diffusivity_m2_s`."""
     matrix = _matrix(flow, diffusivity_m2_s)
-    return Tracer(flow, matrix, linalg.spilu(matrix, **_FACTORS))
+    few = diffusivity_m2_s.size <= _FEW
+    return Tracer(flow, matrix, linalg.splu(matrix) if few else linalg.spilu(matrix, **_FACTORS))
 
 
-def eddy_diffusivity_m2_s(speed_m_s: Cells, axes_m: Sequence[Float[np.ndarray, " vertices"]]) -> Cells:
+def eddy_diffusivity_m2_s(speed_m_s: Cells, axes_m: Sequence[Axis]) -> Cells:
     """Diffusivity of air and eddies by the zero-equation model (Chen and Xu 1998)."""
     near = [_from_wall_m(axis) for axis in axes_m]
     distance_m = np.minimum(np.minimum(near[0][:, None, None], near[1][:, None]), near[2])
     return MOLECULAR_M2_S + 0.03874 * speed_m_s * distance_m / TURBULENT_SCHMIDT
 
 
-def _from_wall_m(axis_m: Float[np.ndarray, " vertices"]) -> Float[np.ndarray, " cells"]:
+def _from_wall_m(axis_m: Axis) -> Axis:
     centres = 0.5 * (axis_m[1:] + axis_m[:-1])
     return np.minimum(centres - axis_m[0], axis_m[-1] - centres)
 
