@@ -29,6 +29,10 @@ COMMANDS = {
         "app.commands.importing",
         "Make captures of pictures that another camera took: TIFF, PNG, JPEG, or a camera's raw files.",
     ),
+    "indoor": (
+        "app.commands.indoor",
+        "Say what the found air means for people and ventilation: draught, PMV, air change, heat, with intervals.",
+    ),
     "jobs": ("app.commands.jobs", "Queue, watch, stop and resume computations."),
     "kiosk": (
         "app.commands.kiosk",

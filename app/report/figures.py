@@ -2,6 +2,9 @@
 
 import base64
 import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,6 +14,18 @@ from core.result import Solution
 
 # Perceptually even and safe for colour-blind eyes.
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A map seen from above: values at vertices (gouraud) or between the edges of cells (flat)."""
+
+    title: str
+    label: str
+    x_m: np.ndarray
+    y_m: np.ndarray
+    values: np.ndarray
+    shading: Literal["gouraud", "flat"]
 
 
 def as_png(figure: Figure, dpi: int = 110) -> bytes:
@@ -108,6 +123,23 @@ def volume_figure(solution: Solution, values: np.ndarray, label: str, highest: f
         for axis, normal in zip(axes, (1, 0, 2), strict=True)
     ]
     figure.colorbar(drawn[0], ax=axes, label=label, shrink=0.85)
+    return figure
+
+
+def plans_figure(plans: Sequence[Plan]) -> Figure:
+    """Maps seen from above, side by side, each with its own scale from zero."""
+    figure = Figure(figsize=(13, 4.6), layout="constrained")
+    axes = figure.subplots(1, len(plans), squeeze=False)[0]
+    for axis, plan in zip(axes, plans, strict=True):
+        most = float(np.nanmax(plan.values)) or 1e-6
+        drawn = axis.pcolormesh(
+            plan.x_m, plan.y_m, plan.values.T, cmap=SEQUENTIAL, vmin=0.0, vmax=most, shading=plan.shading
+        )
+        axis.set_aspect("equal")
+        axis.set_title(plan.title)
+        axis.set_xlabel("x [m]")
+        axis.set_ylabel("y [m]")
+        figure.colorbar(drawn, ax=axis, label=plan.label, shrink=0.85)
     return figure
 
 

@@ -4,7 +4,7 @@ A result is worth more than its report: what cannot be drawn says why in its pla
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +17,23 @@ from app.errors import explained
 from app.experiment.folder import Experiment, open_experiment
 from app.files.durable import write_text
 from app.report.figures import (
+    Plan,
     as_data_uri,
     error_figure,
     images_figure,
+    plans_figure,
     shift_figure,
     slices_figure,
     volume_figure,
 )
 from app.report.finding import Finding, read_finding
+from app.report.indoor import age_of_air, draught_percent, indoor, told
 from app.volume.score import truth_at
 from core.displacement import standard_deviation_px
+from core.occupied import HEAD_M, at_height
 from core.problem import ShiftMeasurement
 from core.result import Solution
+from core.scene import Scene
 
 Rows = Iterable[tuple[str, ...]]
 
@@ -134,6 +139,7 @@ def _sections(finding: Finding) -> list[Section]:
         _drawn("What the camera saw", lambda: _images(finding)),
         _drawn("How far the pattern moved", lambda: _shifts(finding)),
         _drawn("The air", lambda: _air(finding), lambda: _known(finding.solution), lambda: _errors(finding)),
+        _indoor(finding),
         *(
             _drawn(f"Calibration: {view.name}", lambda name=view.name: _calibration(finding.experiment, name))
             for view in finding.experiment.settings.scene.views
@@ -218,6 +224,39 @@ def _errors(finding: Finding) -> Iterable[Picture]:
         yield Picture(
             as_data_uri(error_figure(solution, error)), "Temperature minus truth, on the same planes."
         )
+
+
+def _indoor(finding: Finding) -> Section:
+    """Figures and maps for people and for ventilation."""
+    solution, scene = finding.solution, finding.experiment.settings.scene
+    table = _listed(
+        "People and ventilation", lambda: _indoor_rows(solution, scene), ("quantity", "value", "95 %")
+    )
+    if solution.velocity_m_s is None:
+        return table
+    maps = _drawn(table.title, lambda: _maps(solution, scene))
+    return replace(table, figures=maps.figures, missing=table.missing + maps.missing)
+
+
+def _indoor_rows(solution: Solution, scene: Scene) -> Iterable[tuple[str, ...]]:
+    found = indoor(solution, scene)
+    yield from (told(quantity) for quantity in found.quantities)
+    yield from (("not told", sentence, "") for sentence in found.missing)
+    yield from (("taken", sentence, "") for sentence in found.notes)
+
+
+def _maps(solution: Solution, scene: Scene) -> Iterable[Picture]:
+    """Draught and age at the height of sitting people's heads."""
+    draught = at_height(draught_percent(solution), solution.z_m, HEAD_M)
+    plans = [Plan("draught rate", "%", solution.x_m, solution.y_m, draught, "gouraud")]
+    change = age_of_air(solution, scene)
+    x_m, y_m, z_m = change.flow.axes_m
+    layer = min(int(HEAD_M / (z_m[1] - z_m[0])), len(z_m) - 2)
+    plans.append(Plan("age of the air", "min", x_m, y_m, change.age_s[:, :, layer] / 60.0, "flat"))
+    yield Picture(
+        as_data_uri(plans_figure(plans)),
+        f"Seen from above, {HEAD_M:g} m over the floor: draught rate and age of the air.",
+    )
 
 
 def _calibration(experiment: Experiment, camera: str) -> Iterable[Picture]:

@@ -1,0 +1,100 @@
+"""What enters and leaves by each opening of a found flow: air in m3/s, its temperature, and heat in watts.
+
+    heat = rho cp Q (T_supply - T_exhaust)
+
+Density is that of the air at rest, as the Boussinesq equations have it, also where the supply is ten kelvin warmer.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import equinox as eqx
+import numpy as np
+
+from core.air import Air
+from core.geometry import WALLS, Face, face_of
+from core.scene import Inlet, Outlet, Patch, Scene
+from core.ventilation.face_flow import FaceFlow, Vertices, around, corner_mean
+
+HEAT_CAPACITY_J_KG_K = 1006.0
+# A face of an opening's edge lets less than this share of the greatest flow through.
+_UNSMEARED = 0.8
+
+
+class Passage(eqx.Module):
+    """One opening of the found flow: m3/s into the room (negative: out of it), and that air's temperature."""
+
+    name: str = eqx.field(static=True)
+    inward_m3_s: float
+    temperature_k: float
+
+
+class Exchange(eqx.Module):
+    """All that passes the walls. `heat_w` is what the air brings beyond the exhaust's temperature."""
+
+    passages: tuple[Passage, ...]
+    flow_m3_s: float
+    supply_k: float
+    exhaust_k: float
+    heat_w: float
+
+
+def opening_patches(scene: Scene) -> tuple[Patch, ...]:
+    """Patches of the scene's inlets and outlets."""
+    return tuple(part.patch for part in scene.boundary if isinstance(part, Inlet | Outlet))
+
+
+def exchange(flow: FaceFlow, temperature_k: Vertices, scene: Scene) -> Exchange:
+    """What the walls let through. `temperature_k` is on the vertices that `flow` lies between.
+
+    Where the scene states no opening, a wall with flow is one for the air that enters, and one for what leaves.
+    """
+    passages = tuple(
+        _stated(flow, temperature_k, scene) if opening_patches(scene) else _seen(flow, temperature_k)
+    )
+    supply_k, exhaust_k = (_mean_k(passages, sign) for sign in (1.0, -1.0))
+    heat_w = heat_capacity_j_m3_k(scene.air) * flow.entering_m3_s * (supply_k - exhaust_k)
+    return Exchange(passages, flow.entering_m3_s, supply_k, exhaust_k, heat_w)
+
+
+def heat_capacity_j_m3_k(air: Air) -> float:
+    """Of a cubic metre of the air at rest."""
+    return air.density_kg_m3 * HEAT_CAPACITY_J_KG_K
+
+
+def _stated(flow: FaceFlow, temperature_k: Vertices, scene: Scene) -> Iterator[Passage]:
+    for part in scene.boundary:
+        if isinstance(part, Inlet | Outlet):
+            face = face_of(part.patch.wall)
+            inside = around(part.patch, *(flow.axes_m[a] for a in face.along))
+            kelvin = _on_faces(temperature_k, face)[inside]
+            yield _passage(f"{part.kind} on {part.patch.wall}", flow.inward(face)[inside], kelvin)
+
+
+def _seen(flow: FaceFlow, temperature_k: Vertices) -> Iterator[Passage]:
+    for wall in WALLS:
+        face = face_of(wall)
+        inward, kelvin = flow.inward(face), _on_faces(temperature_k, face)
+        for kind, through in (("inlet", inward > 0), ("outlet", inward < 0)):
+            if through.any():
+                yield _passage(f"{kind} on {wall}", inward[through], kelvin[through])
+
+
+def _passage(name: str, inward_m3_s: np.ndarray, kelvin: np.ndarray) -> Passage:
+    """Supply air has one temperature, read where it is not smeared with the wall's; leaving air has its mean."""
+    total = float(inward_m3_s.sum())
+    weights = np.abs(inward_m3_s)
+    if total > 0:
+        weights = np.where(weights >= _UNSMEARED * weights.max(), weights, 0.0)
+    return Passage(name, total, float(np.average(kelvin, weights=weights)) if weights.any() else float("nan"))
+
+
+def _mean_k(passages: Sequence[Passage], sign: float) -> float:
+    """Mean temperature of all that enters (1) or leaves (-1)."""
+    those = [p for p in passages if sign * p.inward_m3_s > 0]
+    if not those:
+        return float("nan")
+    return float(np.average([p.temperature_k for p in those], weights=[abs(p.inward_m3_s) for p in those]))
+
+
+def _on_faces(temperature_k: Vertices, face: Face) -> np.ndarray:
+    return corner_mean(np.take(np.asarray(temperature_k, np.float64), face.end, axis=face.axis), (0, 1))
