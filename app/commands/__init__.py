@@ -38,6 +38,10 @@ COMMANDS = {
         "app.commands.preview",
         "Take one frame; print its level, contrast, focus and saturation with advice.",
     ),
+    "print": (
+        "app.commands.print",
+        "Write the wall's pattern, or a board to calibrate with, as a PDF at true scale.",
+    ),
     "projector": ("app.commands.projector", "Speak to a projector."),
     "reconstruct": (
         "app.commands.reconstruct",

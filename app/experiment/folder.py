@@ -4,6 +4,7 @@
     calibration/bundle.json    models, with units, date, quality
     captures/<id>/             manifest.json (written last), reference.tif or flow.tif
     results/<id>/              result.nc, report.html, manifest.json (written last)
+    print/                     PDFs of the pattern and of boards, and what was printed (pattern.json, board.json)
     checkpoint/                a reconstruction that was stopped: `airlens reconstruct` goes on from it
     truth.npz                  simulated experiments only: the room that the twin looks at
 
