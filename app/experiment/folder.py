@@ -36,10 +36,15 @@ class ExperimentSettings(Strict):
     """The content of experiment.toml."""
 
     schema_version: Literal[1] = 1
+    """Of this file."""
     title: str = ""
+    """A name for people."""
     information: str = ""
+    """Notes; or what was told of the room."""
     rig: RigSettings = RigSettings()
+    """The devices."""
     scene: Scene
+    """Room, air, cameras, light, and what is known."""
 
 
 @dataclass(frozen=True)

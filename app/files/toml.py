@@ -20,9 +20,12 @@ T = TypeVar("T")
 
 
 class Strict(BaseModel):
-    """Base of every model at the edge: frozen, no unknown key, no silent conversion."""
+    """Base of every model at the edge: frozen, no unknown key, no silent conversion.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+    The text below a field is its description, in a JSON Schema and in REFERENCE.md.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, use_attribute_docstrings=True)
 
 
 def read_toml(path: Path, kind: type[T]) -> T:

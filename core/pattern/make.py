@@ -22,7 +22,8 @@ def make_pattern(pattern: Pattern, rows: int, cols: int) -> Float32[np.ndarray, 
     Wavelet noise has mean 1/2 and rms `contrast` before it is clipped. Raises SettingError for a size or
     a feature below one pixel.
     """
-    _check(pattern, rows, cols)
+    _check_size(rows, cols)
+    check_pattern(pattern)
     match pattern:
         case WaveletPattern():
             luminance = 0.5 + pattern.contrast * wavelet_noise(pattern, rows, cols)
@@ -40,7 +41,8 @@ def pattern_parts(
 
     Slices have both ends. A rectangle takes the memory of its own size. Raises SettingError as `make_pattern` does.
     """
-    _check(pattern, rows, cols)
+    _check_size(rows, cols)
+    check_pattern(pattern)
     match pattern:
         case WaveletPattern():
             noise = wavelet_parts(pattern, rows, cols)
@@ -60,12 +62,16 @@ def pattern_parts(
     return lambda row, col: np.clip(luminance(row, col), 0.0, 1.0).astype(np.float32)
 
 
-def _check(pattern: Pattern, rows: int, cols: int) -> None:
+def _check_size(rows: int, cols: int) -> None:
     if rows < 2 or cols < 2 or rows * cols > _MOST_PIXELS:
         raise SettingError(
             f"A pattern of {cols} x {rows} px was asked for; expected at least 2 x 2 px and at most "
             f"{_MOST_PIXELS:g} in all. Check pixel_m (a print) or the projector's panel."
         )
+
+
+def check_pattern(pattern: Pattern) -> None:
+    """Refuse a pattern that cannot be made. Raises SettingError."""
     match pattern:
         case WaveletPattern():
             check_range("finest_px", pattern.finest_px, 2.0, 1e4, "pattern pixels", _TOO_FINE)
