@@ -26,7 +26,7 @@ def create_cli() -> typer.Typer:
         cls=lazy_group(COMMANDS),
         name="airlens",
         help="See and measure the air in a room with one camera and one projector.",
-        no_args_is_help=True,
+        invoke_without_command=True,
         pretty_exceptions_enable=False,
     )
     cli.callback()(_airlens)
@@ -84,10 +84,29 @@ def _version(wanted: bool) -> None:
 
 
 def _airlens(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_version)
     ] = False,
-) -> None: ...
+) -> None:
+    if context.invoked_subcommand is None:
+        _where_you_are(context)
+
+
+def _where_you_are(context: typer.Context) -> None:
+    """In an experiment, or beside some: how they stand. Elsewhere: the commands, in the order of the work."""
+    from app.commands import status
+
+    here = Path()
+    if (here / status.SETTINGS_FILE).exists():
+        status.show(here)
+    elif status.experiments_in(here):
+        status.show_all(here)
+    else:
+        typer.echo(context.get_help())
+        typer.echo(
+            "Here is no experiment. See the chain: airlens demo. Your own: airlens new --template wall-jet"
+        )
 
 
 def _fail(message: str, status: int) -> None:

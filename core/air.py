@@ -41,11 +41,17 @@ class Air:
     """
 
     pressure_pa: float = 101_325.0
+    """The room's air pressure, of a barometer."""
     ambient_temperature_k: float = 293.15
+    """Temperature of the still air before the reference picture."""
     wavelength_m: float = 600e-9
+    """The light that the camera sees; the middle of it where it is white."""
     gladstone_dale: float | None = None
+    """Gladstone-Dale coefficient [m3/kg]; without it, that of dry air at the wavelength."""
     kinematic_viscosity_m2_s: float = 1.5e-5
+    """Of the air, without turbulence."""
     prandtl: float = 0.71
+    """Viscosity over thermal diffusivity of the air."""
 
     def __post_init__(self) -> None:
         check_range(

@@ -22,7 +22,9 @@ class Box:
     """The room: an axis-aligned box. The back wall, with the pattern, is its face y = upper_m[1]."""
 
     lower_m: Vector3
+    """The corner with the smallest x, y and z; 0.001 to 500 m from the other along each."""
     upper_m: Vector3
+    """The corner with the largest x, y and z; the patterned wall is at its y."""
 
     def __post_init__(self) -> None:
         for axis, lower, upper in zip("xyz", self.lower_m, self.upper_m, strict=True):
@@ -104,12 +106,19 @@ class Optics:
     """
 
     width_px: int
+    """Columns of the picture or panel."""
     height_px: int
+    """Rows of the picture or panel."""
     focal_px: Vector2
+    """Focal length over pixel pitch, along columns and rows."""
     principal_px: Vector2
+    """Where the optical axis meets the picture: column, row."""
     position_m: Vector3
+    """The lens in the room: x, y, z."""
     rotation_rad: Vector3
+    """Rodrigues vector from the world's axes to the optics' (x right, y down, z forward)."""
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    """OpenCV's k1, k2, p1, p2, k3."""
 
     def __post_init__(self) -> None:
         if self.width_px < 1 or self.height_px < 1:

@@ -19,9 +19,13 @@ class CameraNoise:
     """How one frame scatters: shot noise, read noise, dark level and digitisation of a linear sensor."""
 
     full_well_e: float = 10_000.0
+    """Electrons at the brightest count."""
     read_noise_e: float = 3.0
+    """Rms of a dark frame, in electrons."""
     dark_counts: float = 64.0
+    """Counts without light, far below the brightest."""
     bits: int = 12
+    """Digits of a count, 1 to 16."""
 
     def __post_init__(self) -> None:
         if self.full_well_e <= 0 or self.read_noise_e < 0 or not 1 <= self.bits <= 16:
@@ -39,19 +43,23 @@ class CameraNoise:
 
 @setting
 class View:
-    """One camera. `frames` are averaged into one image; `f_number` with `focal_m` opens an aperture cone.
-
-    `drift_std_px` is how far the mount may move the picture between two exposures [px at the picture's edge]: one
-    standard deviation each along columns, along rows, of rotation and of magnification; 0 where it stands still.
-    """
+    """One camera. `frames` are averaged into one image; `f_number` with `focal_m` opens an aperture cone."""
 
     name: str = "camera"
+    """What this camera is called."""
     camera: Optics
+    """Where it stands and how it looks."""
     noise: CameraNoise = CameraNoise()
+    """How its frames scatter."""
     frames: int = 100
+    """How many frames are averaged into one picture."""
     f_number: float | None = None
+    """The number on the lens; with `focal_m` it opens an aperture cone."""
     focal_m: float | None = None
+    """Focal length of the lens."""
     drift_std_px: float = 1.0
+    """How far the mount may move the picture between two exposures, at its edge: one standard deviation each along
+    columns, along rows, of rotation and of magnification; 0 where it stands still."""
 
     def __post_init__(self) -> None:
         check_range(
@@ -72,9 +80,13 @@ class WaveletPattern:
 
     kind: Literal["wavelet"] = "wavelet"
     seed: int = 0
+    """Which of all such patterns."""
     bands: int = 4
+    """Octaves."""
     finest_px: float = 3.0
+    """Finest period in pattern pixels."""
     contrast: float = 0.2
+    """Rms of the luminance about 1/2."""
 
 
 @setting
@@ -83,8 +95,11 @@ class DotPattern:
 
     kind: Literal["dots"] = "dots"
     seed: int = 0
+    """Which of all such patterns."""
     diameter_px: float = 4.0
+    """A dot's diameter in pattern pixels."""
     coverage: float = 0.4
+    """Inked share of the wall."""
 
 
 @setting
@@ -93,6 +108,7 @@ class CheckerPattern:
 
     kind: Literal["checkerboard"] = "checkerboard"
     square_px: float = 8.0
+    """A square's edge in pattern pixels."""
 
 
 Pattern = WaveletPattern | DotPattern | CheckerPattern
@@ -104,7 +120,9 @@ class FixedTexture:
 
     kind: Literal["texture"] = "texture"
     pattern: Pattern = WaveletPattern()
+    """What is printed."""
     pixel_m: float = 0.001
+    """Edge of one pattern pixel on the wall."""
 
     def __post_init__(self) -> None:
         check_range(
@@ -119,7 +137,9 @@ class ProjectedPattern:
 
     kind: Literal["projector"] = "projector"
     pattern: Pattern = WaveletPattern()
+    """What is projected."""
     projector: Optics
+    """The projector, as a camera that sends light."""
 
 
 Light = FixedTexture | ProjectedPattern
@@ -131,7 +151,9 @@ class PlaneField:
 
     kind: Literal["plane_field"] = "plane_field"
     file: str
+    """NPZ of y, z, T, p, u, in the experiment."""
     wall: WallName = "x_min"
+    """The wall that the plane lies on."""
 
 
 @setting
@@ -139,8 +161,11 @@ class Patch:
     """A rectangle on a wall: bounds along the wall's two axes in the order x, y, z [m]."""
 
     wall: WallName
+    """The wall that it lies on."""
     lower_m: Vector2
+    """Its smaller corner along the wall's two axes, in the order x, y, z."""
     upper_m: Vector2
+    """Its larger corner."""
 
     def __post_init__(self) -> None:
         if not all(low < high for low, high in zip(self.lower_m, self.upper_m, strict=True)):
@@ -172,12 +197,19 @@ class Inlet:
 
     kind: Literal["inlet"] = "inlet"
     patch: Patch
+    """Where air comes in."""
     temperature_k: float
+    """Its temperature."""
     velocity_m_s: Vector3
+    """Its mean velocity: x, y, z, into the room."""
     temperature_std_k: float = 0.1
+    """Standard deviation of the temperature."""
     velocity_std_m_s: float = 0.01
+    """Standard deviation of the speed."""
     turbulence_intensity: float = 0.1
+    """Rms of the fluctuations over the speed."""
     length_scale_m: float | None = None
+    """Mixing length; without it, 0.07 of the hydraulic diameter."""
 
     def __post_init__(self) -> None:
         check_kelvin("The inlet's temperature", self.temperature_k)
@@ -202,8 +234,11 @@ class Outlet:
 
     kind: Literal["outlet"] = "outlet"
     patch: Patch
+    """Where air leaves."""
     mean_temperature_k: float | None = None
+    """A thermometer in it; without it the outlet fixes no level."""
     temperature_std_k: float = 0.1
+    """Standard deviation of that thermometer."""
 
     def __post_init__(self) -> None:
         if self.mean_temperature_k is not None:
@@ -217,10 +252,15 @@ class Wall:
 
     kind: Literal["wall"] = "wall"
     wall: WallName
+    """Which one."""
     no_slip: bool = True
+    """Whether air sticks to it."""
     thermal: Literal["unknown", "adiabatic", "temperature"] = "unknown"
+    """What is known: nothing, that it passes no heat, or its temperature."""
     temperature_k: float | None = None
+    """Its surface's temperature."""
     temperature_std_k: float = 0.1
+    """Standard deviation of it."""
 
     def __post_init__(self) -> None:
         if (self.thermal == "temperature") != (self.temperature_k is not None):
@@ -239,8 +279,11 @@ class Heater:
 
     kind: Literal["heater"] = "heater"
     patch: Patch
+    """Where it is."""
     temperature_k: float
+    """Its surface's temperature."""
     temperature_std_k: float = 0.5
+    """Standard deviation of it."""
 
     def __post_init__(self) -> None:
         check_kelvin("The heater's temperature", self.temperature_k)
@@ -253,6 +296,7 @@ class PointSensors:
 
     kind: Literal["sensors"] = "sensors"
     file: str
+    """CSV of x, y, z, T, T_std, u, v, w, u_std, in the experiment."""
 
 
 BoundaryInformation = PlaneField | Inlet | Outlet | Wall | Heater | PointSensors
@@ -263,8 +307,11 @@ class FlowModel:
     """Transport of momentum and heat: molecular, given effective coefficients, or a closure / learned."""
 
     transport: Literal["auto", "molecular", "given", "zero_equation", "k_epsilon", "learned"] = "auto"
+    """How momentum and heat spread."""
     viscosity_m2_s: float | None = None
+    """With `given`: effective viscosity, 1e-9 to 1e3."""
     diffusivity_m2_s: float | None = None
+    """With `given`: effective diffusivity, 1e-9 to 1e3."""
 
     def __post_init__(self) -> None:
         for name in ("viscosity_m2_s", "diffusivity_m2_s"):
@@ -279,11 +326,17 @@ class RayModel:
     """How rays are traced and the pattern is looked up; `auto` resolves from bounds."""
 
     tracer: Literal["auto", "straight", "quasi_linear", "nonlinear"] = "auto"
+    """How a ray bends."""
     steps: int | Auto = "auto"
+    """Steps along a ray."""
     projector_order: Literal[1, 2] | Auto = "auto"
+    """Terms of the projector's own shift."""
     irradiance: bool | Auto = "auto"
+    """Whether the air gathers and spreads the projector's light."""
     samples_per_pixel: int | Auto = "auto"
+    """Rays averaged over a pixel."""
     aperture_cone: bool | Auto = "auto"
+    """Whether the lens is a disc; it needs `f_number` and `focal_m`."""
 
     def __post_init__(self) -> None:
         if self.steps != "auto":
@@ -297,8 +350,11 @@ class SolveModel:
     """What the reconstruction works on; `auto` resolves from the scene and the noise."""
 
     data_term: Literal["auto", "rendered", "warped", "displacement"] = "auto"
+    """What is compared: images, images moved back, or shifts."""
     grid: int | Auto = "auto"
+    """Cells along an edge of the room."""
     window_px: int | Auto = "auto"
+    """Edge of the window that one shift is measured in."""
 
     def __post_init__(self) -> None:
         if self.grid != "auto":
@@ -312,13 +368,21 @@ class Scene:
     """Room, air, views, light, what is known at the boundary, and how to model it."""
 
     room: Box
+    """The box that the air is in."""
     air: Air = Air()
+    """The air at rest."""
     views: tuple[View, ...]
+    """The cameras, one at least."""
     light: Light
+    """What patterns the wall."""
     boundary: tuple[BoundaryInformation, ...] = ()
+    """What is known of openings, walls and sensors; empty: the pictures alone."""
     flow: FlowModel = FlowModel()
+    """How air moves in the model."""
     rays: RayModel = RayModel()
+    """How light is traced."""
     solve: SolveModel = SolveModel()
+    """What the reconstruction works on."""
 
     def __post_init__(self) -> None:
         if not self.views:

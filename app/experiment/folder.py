@@ -4,6 +4,7 @@
     calibration/bundle.json    models, with units, date, quality
     captures/<id>/             manifest.json (written last), reference.tif or flow.tif
     results/<id>/              result.nc, report.html, manifest.json (written last)
+    print/                     PDFs of the pattern and of boards, and what was printed (pattern.json, board.json)
     checkpoint/                a reconstruction that was stopped: `airlens reconstruct` goes on from it
     truth.npz                  simulated experiments only: the room that the twin looks at
 
@@ -35,10 +36,15 @@ class ExperimentSettings(Strict):
     """The content of experiment.toml."""
 
     schema_version: Literal[1] = 1
+    """Of this file."""
     title: str = ""
+    """A name for people."""
     information: str = ""
+    """Notes; or what was told of the room."""
     rig: RigSettings = RigSettings()
+    """The devices."""
     scene: Scene
+    """Room, air, cameras, light, and what is known."""
 
 
 @dataclass(frozen=True)

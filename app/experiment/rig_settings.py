@@ -14,11 +14,17 @@ class SimulatedCameraSettings(Strict):
     """A camera twin that looks at a room volume in the experiment folder."""
 
     kind: Literal["simulated"] = "simulated"
+    """A camera that computes its pictures."""
     room: str = "truth.npz"
+    """The room that it looks at, in the experiment."""
     exposure_s: Annotated[float, Field(gt=0, le=60)] = 0.02
+    """Exposure of a frame."""
     seed: int = 0
+    """Of noise and drift."""
     drift_px: Annotated[float, Field(ge=0, le=20)] = 0.0
+    """How far the camera moves between reference and flow."""
     noise_free: bool = False
+    """Whether its frames have no noise."""
 
 
 class V4l2CameraSettings(Strict):
@@ -29,15 +35,25 @@ class V4l2CameraSettings(Strict):
     """
 
     kind: Literal["v4l2"]
+    """A camera of the kernel."""
     device: str = "/dev/video0"
+    """Its device file; `airlens devices` lists them."""
     pixel_format: str = "Y16"
+    """Raw or grey format, as the kernel names it."""
     width_px: Annotated[int, Field(gt=0)]
+    """Columns."""
     height_px: Annotated[int, Field(gt=0)]
+    """Rows."""
     bits: Annotated[int, Field(ge=1, le=16)] = 16
+    """Digits of a count."""
     exposure_s: Annotated[float, Field(gt=0, le=60)]
+    """Exposure of a frame."""
     gain: float | None = None
+    """In the camera's own unit; its own unless given."""
     frame_rate_hz: Annotated[float | None, Field(gt=0, le=10_000)] = None
+    """Frames a second; the camera's own unless given."""
     automatics_off: bool = True
+    """Whether automatic exposure, gain, white balance and focus are switched off."""
 
 
 CameraSettings = Annotated[SimulatedCameraSettings | V4l2CameraSettings, Field(discriminator="kind")]
@@ -47,11 +63,17 @@ class BoardSettings(Strict):
     """The board that the rig is calibrated with: inner corners (chessboard), squares (ChArUco) or circles."""
 
     kind: Literal["chessboard", "charuco", "circles", "asymmetric-circles"] = "chessboard"
+    """What is on the board."""
     columns: Annotated[int, Field(ge=2, le=200)]
+    """Inner corners, ChArUco squares, or circles in a row."""
     rows: Annotated[int, Field(ge=2, le=200)]
+    """The same in a column."""
     square_m: Annotated[float, Field(gt=0, le=10)]
+    """A square's edge, or the circles' spacing."""
     marker_m: Annotated[float | None, Field(gt=0, le=10)] = None
+    """A ChArUco marker's edge; 0.75 of a square unless given."""
     dictionary: str = "DICT_5X5_250"
+    """ChArUco's markers, as OpenCV names them."""
 
     def board(self) -> Board:
         """The board. Raises BadInputError for a combination that cannot be."""
@@ -74,14 +96,18 @@ class ProjectorSettings(Strict):
     """
 
     url: str
+    """Its address: dialect, then host or serial port."""
 
 
 class RigSettings(Strict):
     """The devices of the rig, and the board that it is calibrated with. No device stands in for one not named."""
 
     camera: CameraSettings | None = None
+    """The camera."""
     projector: ProjectorSettings | None = None
+    """The projector, where it is spoken to."""
     board: BoardSettings | None = None
+    """The board for calibration."""
 
     @property
     def camera_kind(self) -> str:

@@ -16,12 +16,12 @@ from app.rig.practice_room import PracticeRoom
 from app.rig.projectors import open_real_projector
 from app.rig.stage import RealStage, Stage, Task
 from app.volume.file import RoomVolume, read_volume
-from app.volume.scene import FINEST_PX
 from calibration.board import Board
 from core.fields import GridField
 from core.geometry import Box, Optics, crop, rotation_matrix, rotation_vector
+from core.plan.print_choice import suited_print
 from core.render import render_flow, render_reference
-from core.scene import FixedTexture, ProjectedPattern, Scene, WaveletPattern
+from core.scene import ProjectedPattern, Scene
 from drivers.burst import CaptureRole
 from drivers.clock import SystemClock
 from drivers.display import PatternDisplay, Picture
@@ -200,10 +200,7 @@ def _framed(
     (x0, y0, z0), (x1, y1, z1) = room.lower_m, room.upper_m
     wide = Box(lower_m=(x0 - reach_m, y0, z0 - reach_m), upper_m=(x1 + reach_m, y1, z1 + reach_m))
     camera = scene.views[view].camera
-    camera_px_m = (y1 - camera.position_m[1]) / camera.focal_px[0]
-    print_ = FixedTexture(
-        pattern=WaveletPattern(seed=FRAME_SEED, finest_px=FINEST_PX), pixel_m=camera_px_m / 2
-    )
+    print_ = suited_print(camera, y1 - camera.position_m[1], FRAME_SEED)
     frame_scene = replace(scene, room=wide, light=print_)
     framed = image.copy()
     for strip in _strips_around(~beyond):

@@ -24,19 +24,33 @@ class CameraAnswer(Strict):
     """
 
     kind: Literal["v4l2", "simulated"]
+    """A camera of the kernel, or one that computes its pictures."""
     device: str = "/dev/video0"
+    """Its device file; `airlens devices` lists them."""
     pixel_format: str = "Y16"
+    """Raw or grey format, as the kernel names it."""
     bits: Annotated[int, Field(ge=1, le=16)] = 12
+    """Digits of a count."""
     width_px: Pixels
+    """Columns."""
     height_px: Pixels
+    """Rows."""
     exposure: Time = 0.02
+    """Exposure of a frame."""
     frames: Annotated[int, Field(ge=1, le=100_000)] = 100
+    """How many frames are averaged into one picture."""
     angle_of_view: Angle | None = None
+    """Across the picture; or give the next two."""
     focal_length: Distance | None = None
+    """Of the lens."""
     pixel_pitch: Distance | None = None
+    """From one pixel of the sensor to the next."""
     distance: Distance | None = None
+    """From the patterned wall, straight at its middle; or give `position`."""
     position: tuple[Length, Length, Length] | None = None
+    """The lens, from the room's corner: x, y, z."""
     truth: str = ""
+    """For a simulated camera: the room that it looks at (NPZ)."""
 
     @model_validator(mode="after")
     def _one_way(self) -> "CameraAnswer":
@@ -54,28 +68,41 @@ class ProjectorAnswer(Strict):
     """A projector instead of a print: where its lens is, its panel, and its address if it can be spoken to."""
 
     position: tuple[Length, Length, Length]
+    """The lens, from the room's corner: x, y, z."""
     width_px: Pixels
+    """Columns of the panel."""
     height_px: Pixels
+    """Rows of the panel."""
     angle_of_view: Angle
+    """Across the picture."""
     url: str = ""
+    """Its address, where it can be spoken to."""
 
 
 class Opening(Strict):
     """A rectangle on a wall."""
 
     wall: WallName
+    """The wall that it is on."""
     lower: tuple[Length, Length]
+    """Its smaller corner along the wall's two axes, in the order x, y, z."""
     upper: tuple[Length, Length]
+    """Its larger corner."""
 
 
 class SupplyAnswer(Opening):
     """Air that is blown in, straight off its wall: as volume flow, or as mean speed."""
 
     flow: Flow | None = None
+    """Volume that comes in; or give `speed`."""
     speed: Speed | None = None
+    """Mean speed over the opening."""
     deviation: Share = 0.05
+    """Standard deviation of it, as a share."""
     temperature: Temperature
+    """Of the air that comes in."""
     temperature_deviation: Difference = 0.3
+    """Standard deviation of it."""
 
     @model_validator(mode="after")
     def _one_way(self) -> "SupplyAnswer":
@@ -90,23 +117,31 @@ class OutletAnswer(Opening):
     """Where air leaves; a thermometer in it fixes the level of every temperature."""
 
     temperature: Temperature | None = None
+    """Of the air that leaves; without a thermometer leave it out."""
     temperature_deviation: Difference = 0.3
+    """Standard deviation of it."""
 
 
 class SurfaceAnswer(Opening):
     """A radiator, a heated floor, a cooled ceiling, a cold window: its surface's temperature."""
 
     temperature: Temperature
+    """Of the surface."""
     temperature_deviation: Difference = 0.5
+    """Standard deviation of it."""
 
 
 class WallAnswer(Strict):
     """A whole wall: its surface's temperature, or `adiabatic = true` for one that passes no heat."""
 
     wall: WallName
+    """Which wall."""
     temperature: Temperature | None = None
+    """Of its surface; or give `adiabatic`."""
     temperature_deviation: Difference = 0.3
+    """Standard deviation of it."""
     adiabatic: bool = False
+    """Whether it passes no heat."""
 
     @model_validator(mode="after")
     def _one_way(self) -> "WallAnswer":
@@ -119,30 +154,48 @@ class ThermometerAnswer(Strict):
     """A thermometer in the room's air."""
 
     position: tuple[Length, Length, Length]
+    """From the room's corner: x, y, z."""
     temperature: Temperature
+    """What it shows."""
     temperature_deviation: Difference = 0.2
+    """Standard deviation of it."""
 
 
 class AnemometerAnswer(Strict):
     """An anemometer: the three components of the velocity, along x, y and z."""
 
     position: tuple[Length, Length, Length]
+    """From the room's corner: x, y, z."""
     velocity: tuple[Speed, Speed, Speed]
+    """Along x, y and z."""
     deviation: Annotated[Speed, Field(gt=0)] = 0.05
+    """Standard deviation of each."""
 
 
 class Answers(Strict):
     """All answers. `air` is the room's temperature when the reference picture is taken: no flow, no heat."""
 
     title: str = ""
+    """A name for people; the room's size unless given."""
     room: tuple[Size, Size, Size]
+    """Length along x, y and z."""
     air: Temperature
+    """Temperature of the still air before the reference picture."""
     camera: CameraAnswer
+    """The camera."""
     projector: ProjectorAnswer | None = None
+    """A projector instead of a print."""
     pattern_seed: int = 0
+    """Which of all random patterns."""
     supply: tuple[SupplyAnswer, ...] = ()
+    """Where air is blown in."""
     outlet: tuple[OutletAnswer, ...] = ()
+    """Where air leaves."""
     surface: tuple[SurfaceAnswer, ...] = ()
+    """Warm and cold surfaces."""
     wall: tuple[WallAnswer, ...] = ()
+    """Walls of which something is known."""
     thermometer: tuple[ThermometerAnswer, ...] = ()
+    """Thermometers in the air."""
     anemometer: tuple[AnemometerAnswer, ...] = ()
+    """Anemometers in the air."""

@@ -1,5 +1,6 @@
 """An experiment's folder from answers: it appears whole or not at all."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -7,6 +8,8 @@ from app.errors import BadInputError
 from app.experiment.folder import Experiment, create_experiment, open_experiment
 from app.files.durable import durable_folder, write_durably, write_text
 from app.files.toml import from_toml
+from app.files.toml_errors import at_place
+from app.files.toml_places import nearest, places_of
 from app.setup.answers import Answers
 from app.setup.scene import SENSORS_FILE, TRUTH_FILE, sensor_table, settings_of
 from app.volume.file import read_volume
@@ -31,7 +34,10 @@ def new_experiment(folder: Path, text: str, source: str) -> Experiment:
     truth = Path(answers.camera.truth) if answers.camera.truth else None
     # A simulated room keeps its own coordinates: its corner is where they have it.
     corner_m = (0.0, 0.0, 0.0) if truth is None else room_box(read_volume(truth)).lower_m
-    settings = settings_of(answers, corner_m)
+    try:
+        settings = settings_of(answers, corner_m)
+    except BadInputError as error:
+        raise BadInputError(_placed(str(error), text, source)) from error
     with durable_folder(folder) as unfinished:
         create_experiment(unfinished, settings)
         write_text(unfinished / ANSWERS_FILE, text)
@@ -41,3 +47,11 @@ def new_experiment(folder: Path, text: str, source: str) -> Experiment:
         if truth is not None:
             write_durably(unfinished / TRUTH_FILE, lambda temporary: shutil.copyfile(truth, temporary))
     return open_experiment(folder)
+
+
+def _placed(sentence: str, text: str, source: str) -> str:
+    """A sentence about an answer (`supply 2: ...`, `camera.position: ...`) with the line and column of it."""
+    named = re.match(r"([a-z_.]+)(?: (\d+))?: ", sentence)
+    path = [*named[1].split("."), *([int(named[2]) - 1] if named[2] else [])] if named else []
+    found = nearest(places_of(text), tuple(path))
+    return f"{at_place(source, found[1].key)}: {sentence}" if found else sentence

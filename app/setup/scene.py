@@ -11,10 +11,11 @@ from app.experiment.rig_settings import (
     V4l2CameraSettings,
 )
 from app.setup.answers import Answers, CameraAnswer, Opening, SupplyAnswer
-from app.volume.scene import printed, projected
+from app.volume.scene import projected
 from core.air import Air
 from core.geometry import WALLS, Box, Optics, Vector3, face_of, looking_along_y
 from core.known import refuse_overlaps
+from core.plan.print_choice import suited_print
 from core.scene import (
     BoundaryInformation,
     CameraNoise,
@@ -119,7 +120,7 @@ def _focal_of_angle(width_px: int, angle_deg: float) -> float:
 def _light(answers: Answers, camera: Optics, room: Box) -> Light:
     thrown = answers.projector
     if thrown is None:
-        return printed(camera, room.upper_m[1] - camera.position_m[1], answers.pattern_seed)
+        return suited_print(camera, room.upper_m[1] - camera.position_m[1], answers.pattern_seed)
     focal_px = _focal_of_angle(thrown.width_px, thrown.angle_of_view)
     projector = _straight(_moved(thrown.position, room.lower_m), thrown.width_px, thrown.height_px, focal_px)
     return projected(camera, projector, answers.pattern_seed)

@@ -9,7 +9,7 @@ from pydantic_core import CoreSchema
 from pydantic_core.core_schema import no_info_before_validator_function
 
 # Unit to (factor, offset): SI = factor * value + offset.
-_UNITS: dict[str, dict[str, tuple[float, float]]] = {
+UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "length": {
         "m": (1.0, 0.0),
         "cm": (1e-2, 0.0),
@@ -48,7 +48,7 @@ _COLDEST_K, _HOTTEST_K = 200.0, 800.0
 
 def to_si(text: Any, kind: str) -> float:
     """The SI value of a text such as "45 cm". Raises ValueError: not text, no unit, an unknown unit."""
-    units = _UNITS[kind]
+    units = UNITS[kind]
     known = f"a number and its unit ({', '.join(units)}), such as {_EXAMPLES[kind]!r}"
     written = _WRITTEN.fullmatch(text) if isinstance(text, str) else None
     if written is None:
@@ -77,6 +77,17 @@ class Written:
         if not self.low <= value <= self.high:
             raise ValueError(f"{text!r} is out of range. {self.advice}")
         return value
+
+    @property
+    def range_text(self) -> str:
+        """The range in the first of the units."""
+        low, unit = self.text(self.low).split(" ")
+        return f"{low} to {self.text(self.high).split(' ')[0]} {unit}"
+
+    def text(self, value: float) -> str:
+        """An SI value as it is written, in the first of the units."""
+        unit, (factor, offset) = next(iter(UNITS[self.kind].items()))
+        return f"{(value - offset) / factor:.4g} {unit}"
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return no_info_before_validator_function(self.read, handler(source))

@@ -12,10 +12,10 @@ from app.files.durable import durable_path
 from app.volume.file import RoomVolume
 from core.air import GAS_CONSTANT_DRY_AIR_J_KG_K, Air
 from core.geometry import Box, Optics, Vector2, Vector3, WallName, looking_along_y
+from core.plan.print_choice import suited_print
 from core.scene import (
     BoundaryInformation,
     CameraNoise,
-    FixedTexture,
     Heater,
     Inlet,
     Light,
@@ -36,8 +36,6 @@ RigName = Literal["paper", "lab"]
 BORDER = 0.03
 # Two windows, and the gradient's reach at the picture's edge.
 BORDER_PX = 36
-# Finest period of a printed pattern, in pattern pixels (half a camera pixel each).
-FINEST_PX = 10.0
 PLANE_FILE = "boundary/plane_x_min.npz"
 
 _WALLS: dict[str, WallName] = {
@@ -179,20 +177,11 @@ def _covering(
 
 def _light(room: Box, camera: Optics, options: RigOptions) -> Light:
     if options.light == "texture":
-        return printed(camera, options.stand_off_m, options.pattern_seed)
+        return suited_print(camera, options.stand_off_m, options.pattern_seed)
     projector = _covering(
         room, options.projector_px, options.border_px, options.stand_off_m, options.baseline_m
     )
     return projected(camera, projector, options.pattern_seed)
-
-
-def printed(camera: Optics, stand_off_m: float, seed: int) -> FixedTexture:
-    """The print for a camera at this distance: twice as fine as its pixels, the finest band 5 of them.
-
-    Finer bands alias in the camera: at 3 px a drift of 0.1 px is measured 0.6 % wrong, at 5 px 0.2 %.
-    """
-    pixel_m = stand_off_m / camera.focal_px[0]
-    return FixedTexture(pattern=WaveletPattern(seed=seed, finest_px=FINEST_PX), pixel_m=pixel_m / 2)
 
 
 def projected(camera: Optics, projector: Optics, seed: int) -> ProjectedPattern:

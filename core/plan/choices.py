@@ -8,9 +8,10 @@ from core.plan.choice import Choice
 from core.plan.expected import ExpectedFlow
 from core.plan.flow_choices import grid, transport
 from core.plan.picture_choices import aperture, data_term, precision, window
+from core.plan.print_choice import finest_period
 from core.plan.ray_choices import irradiance, probe_of, projector_order, tracer_of, tracing
 from core.plan.signal import Signal
-from core.scene import ProjectedPattern, Scene
+from core.scene import FixedTexture, ProjectedPattern, Scene
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ def resolve(scene: Scene, flow: ExpectedFlow, signals: tuple[Signal, ...]) -> Re
         order, lit = projector_order(probe, tracer), irradiance(probe, signal, tracer)
         rays = replace(rays, projector_order=order.value, irradiance=lit.value)
         made += [order, lit]
+    if isinstance(scene.light, FixedTexture):
+        made.append(finest_period(scene.light, scene))
     cone, data = aperture(scene, view, signal), data_term(scene, view, signal)
     settled = replace(
         scene,

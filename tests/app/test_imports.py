@@ -11,6 +11,7 @@ from app.bench import BENCHES
 from app.commands import COMMANDS
 from app.commands.calibrate import STEPS
 from app.commands.lazy import commands_of
+from app.commands.print import SHEETS
 from app.commands.reconstruct import PRESETS as NAMES
 from app.reconstruct.presets import PRESETS
 
@@ -26,6 +27,7 @@ HEAVY = (
     "xarray",
     "equinox",
     "h5netcdf",
+    "reportlab",
 )
 
 
@@ -87,7 +89,9 @@ def test_completion_offers_words_and_loads_nothing_heavy(words, offered):
     assert lines[-1] == "loaded"
 
 
-@pytest.mark.parametrize("table", [COMMANDS, BENCHES, STEPS], ids=["commands", "benches", "steps"])
+@pytest.mark.parametrize(
+    "table", [COMMANDS, BENCHES, STEPS, SHEETS], ids=["commands", "benches", "steps", "sheets"]
+)
 def test_the_tables_of_commands_say_what_the_modules_register(table):
     registered = {
         name: (module, command.get_short_help_str(400))

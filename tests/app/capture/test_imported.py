@@ -76,7 +76,9 @@ def test_the_noise_comes_from_the_frames():
     picture = pattern(400, 400, level=0.4, contrast=0.3)
     sensor = SensorNoise(5_000.0, 10.0, 64.0, 12)
     scenes = [part * picture for part in light]
-    taken = [SimulatedCamera(lambda v=v: v, seed=n, noise=sensor).follow().pixels for n, v in enumerate(scenes)]
+    taken = [
+        SimulatedCamera(lambda v=v: v, seed=n, noise=sensor).follow().pixels for n, v in enumerate(scenes)
+    ]
     mean = (np.mean(taken, 0) / 4095).astype(np.float32)
     std = (np.std(taken, 0, ddof=1) / 4095).astype(np.float32)
     found = scattered_variance(mean, std, FRAMES, float(light.std(ddof=1)), 1 / 4095)

@@ -121,7 +121,11 @@ WRONG = [
         '["1.8 m", "2.9 m"]',
         r"supply 1: 2.3 to 2.9 m along z is not on x_min.*0 to 2.7 m",
     ),
-    ('["1.8 m", "2.5 m"]', '["1 m", "2.5 m"]', r"supply 1: lower is 1.2 m and upper 1 m along y"),
+    (
+        '["1.8 m", "2.5 m"]',
+        '["1 m", "2.5 m"]',
+        r"line \d+, column 1: supply 1: lower is 1.2 m and upper 1 m along y",
+    ),
     ('["1.8 m", "2.5 m"]', '["1800 m", "2.5 m"]', r"supply.0.upper.0: .*millimetres"),
     ('wall = "x_max"', 'wall = "x_min"\nkind = "outlet"', r"unknown key 'outlet.0.kind'"),
     ("[[outlet]]", "[[surface]]", r"1 supplies and 0 outlets.*must leave"),
@@ -131,7 +135,11 @@ WRONG = [
         r"The inlet and the outlet on x_min overlap",
     ),
     ('distance = "4 m"', "", r"camera: .*give distance .* or position"),
-    ('distance = "4 m"', 'position = ["2 m", "3.5 m", "1 m"]', r"camera.position: y is 3.5 m, at or behind"),
+    (
+        'distance = "4 m"',
+        'position = ["2 m", "3.5 m", "1 m"]',
+        r"line \d+, column 1: camera.position: y is 3.5 m, at or behind",
+    ),
     ('distance = "4 m"', 'distance = "0 m"', r"camera.distance: .*above zero"),
     ('focal_length = "10 mm"', "", r"camera: .*angle_of_view, or focal_length and pixel_pitch"),
     ('focal_length = "10 mm"', 'angle_of_view = "400 deg"', r"camera.angle_of_view: .*1 to 170 degrees"),
@@ -159,7 +167,7 @@ WRONG = [
         r"Wall z_max is answered twice",
     ),
     ("[[supply]]", "[[inlet]]", r"unknown key 'inlet'"),
-    ("[camera]", "[camera", r"not valid TOML .*line"),
+    ("[camera]", "[camera", r"line \d+, column \d+: it is not valid TOML"),
 ]
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from core.pattern import decode_gray, gray_code, make_pattern
+from core.pattern import decode_gray, gray_code, make_pattern, pattern_parts
 from core.scene import CheckerPattern, DotPattern, WaveletPattern
 from core.setting import SettingError
 
@@ -76,3 +76,20 @@ def test_gray_code_names_every_projector_pixel():
 def test_features_below_a_pixel_are_refused(pattern, hint):
     with pytest.raises(SettingError, match=hint):
         make_pattern(pattern, 32, 32)
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        WaveletPattern(seed=3, finest_px=5.0),
+        DotPattern(seed=2, diameter_px=3.5),
+        CheckerPattern(square_px=3.7),
+    ],
+)
+def test_rectangles_put_together_are_the_whole(pattern, monkeypatch):
+    monkeypatch.setattr("core.pattern.wavelet._STRIP_PIXELS", 1000)
+    rows, cols = 157, 211
+    whole, part = make_pattern(pattern, rows, cols), pattern_parts(pattern, rows, cols)
+    for row in (slice(0, 40), slice(33, 157)):
+        for col in (slice(0, 101), slice(101, 211)):
+            np.testing.assert_allclose(part(row, col), whole[row, col], atol=1e-6)

@@ -1,0 +1,104 @@
+"""`airlens print pattern` and `airlens print board`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from app.experiment.rig_settings import BoardSettings
+
+PaperName = Annotated[str, typer.Option(help="a4, a3, a2, a1, a0, or the width of a roll, such as 841mm.")]
+Out = Annotated[Path | None, typer.Option(help="PDF to write; by default in the experiment's print/.")]
+BoardKind = Literal["charuco", "chessboard", "circles", "asymmetric-circles"]
+
+
+def register(cli: typer.Typer) -> None:
+    """Add `pattern` and `board`."""
+    cli.command()(pattern)
+    cli.command()(board)
+
+
+def pattern(
+    experiment: Annotated[Path, typer.Argument(help="Experiment folder.")],
+    paper: PaperName = "a3",
+    overlap: Annotated[str, typer.Option(help="What neighbouring sheets share.")] = "10mm",
+    choose: Annotated[
+        bool,
+        typer.Option(
+            "--choose", help="First give the scene the finest pattern that suits camera and distance."
+        ),
+    ] = False,
+    out: Out = None,
+) -> None:
+    """Write the scene's printed pattern as a PDF at true scale, in sheets that overlap."""
+    from rich.progress import Progress
+
+    from app.calibrate.options import length_m
+    from app.experiment.folder import open_experiment
+    from app.sheets.pattern import choose_pattern, print_pattern
+
+    overlap_m = length_m(overlap, "--overlap")
+    opened = choose_pattern(experiment) if choose else open_experiment(experiment)
+    with Progress(transient=True) as progress:
+        task = progress.add_task("sheets", total=None)
+        path, printed = print_pattern(
+            opened,
+            paper,
+            out,
+            overlap_m,
+            on_sheet=lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    rows, cols = printed.sheets
+    typer.echo(
+        f"{path}: {rows * cols} sheets of {printed.paper}, {rows} rows of {cols}, for {printed.width_m:.3f} x "
+        f"{printed.height_m:.3f} m of wall; finest period {1e3 * (printed.finest_period_m or 0):.3g} mm, "
+        f"{printed.finest_period_camera_px:.2g} camera px. Print at 100 % and hold a ruler to the bar of 100 mm."
+    )
+
+
+def board(
+    experiment: Annotated[Path | None, typer.Argument(help="Experiment folder; may be left out.")] = None,
+    kind: Annotated[BoardKind | None, typer.Option(help="Kind of board.")] = None,
+    grid: Annotated[
+        str, typer.Option(help="ChArUco squares, inner corners, or circles: 9x6. The rig's own by default.")
+    ] = "",
+    square: Annotated[
+        str, typer.Option(help="Size of a square, or spacing of circles: 30mm. The largest by default.")
+    ] = "",
+    marker: Annotated[str, typer.Option(help="Size of a ChArUco marker (0.75 of a square).")] = "",
+    dictionary: Annotated[str, typer.Option(help="ChArUco dictionary.")] = "DICT_5X5_250",
+    paper: PaperName = "a3",
+    out: Out = None,
+) -> None:
+    """Write a board to calibrate with as a PDF at true scale."""
+    from app.experiment.folder import open_experiment
+    from app.sheets.board import print_board, remember_board
+
+    opened = None if experiment is None else open_experiment(experiment)
+    own = None if opened is None else opened.settings.rig.board
+    asked = bool(kind or grid or square or marker)
+    settings = (
+        own if own and not asked else _settings(kind or "charuco", grid, square, marker, dictionary, paper)
+    )
+    path, _ = print_board(settings, paper, out, opened)
+    kept = opened is not None and remember_board(opened, settings)
+    typer.echo(
+        f"{path}: {settings.kind} {settings.columns} x {settings.rows}, squares of {1e3 * settings.square_m:g} mm. "
+        "Print at 100 %, hold a ruler to the bar of 100 mm, and glue it on something flat."
+        + (" It is the rig's board now." if kept else "")
+    )
+
+
+def _settings(
+    kind: BoardKind, grid: str, square: str, marker: str, dictionary: str, paper: str
+) -> "BoardSettings":
+    from app.calibrate.options import length_m, size_of
+    from app.experiment.rig_settings import BoardSettings
+    from app.sheets.board import largest_square_m
+
+    columns, rows = size_of(grid or "9x6", "--grid", "9x6")
+    unit = BoardSettings(kind=kind, columns=columns, rows=rows, square_m=1.0, dictionary=dictionary)
+    square_m = length_m(square, "--square") if square else largest_square_m(unit, paper)
+    marker_m = length_m(marker, "--marker") if marker else None
+    return unit.model_copy(update={"square_m": square_m, "marker_m": marker_m})

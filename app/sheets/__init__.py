@@ -1,0 +1,1 @@
+"""Sheets of paper at true scale: the scene's pattern in tiles, and boards to calibrate with."""

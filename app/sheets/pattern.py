@@ -1,0 +1,197 @@
+"""The scene's printed pattern as sheets of paper: the very luminance that the simulator renders.
+
+The scene describes the pattern in pixels of `pixel_m`, and the renderer reads between them by a cubic spline. So do
+the sheets, in print pixels of at most half a millimetre; grey 0 to 255 is luminance 0 to 1.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+from scipy.ndimage import affine_transform, spline_filter
+
+from app.errors import BadInputError
+from app.experiment.folder import Experiment, open_experiment, save_settings
+from app.experiment.printed import PRINT_FOLDER, Printed
+from app.files.lock import locked
+from app.files.toml import to_plain
+from app.sheets.drawing import Shared, Sheets
+from app.sheets.paper import Layout, Tile, laid_out
+from app.sheets.record import keep_record, version, write_sheets
+from core.pattern import pattern_parts
+from core.plan.print_choice import (
+    LEAST_PERIOD_PX,
+    camera_pixel_m,
+    finest_period_m,
+    period_in_camera_px,
+    suited_print,
+)
+from core.render.light import texture_size
+from core.scene import CheckerPattern, FixedTexture, Scene
+
+_PRINT_PIXEL_M = 0.0005
+# A cubic spline's coefficients forget what is so many pixels away, to 1e-9.
+_MARGIN_PX = 16
+_STRIP_PIXELS = 2**22
+OnSheet = Callable[[int, int], object]
+
+
+@dataclass(frozen=True)
+class PrintPattern:
+    """A pattern in print pixels, `fine` of them along each pattern pixel; any rectangle can be made."""
+
+    light: FixedTexture
+    rows: int
+    cols: int
+    fine: int
+    part: Callable[[slice, slice], Float32[np.ndarray, "_ _"]]
+
+    @property
+    def print_pixel_m(self) -> float:
+        """Edge of a print pixel."""
+        return self.light.pixel_m / self.fine
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Rows and columns in print pixels."""
+        return self.rows * self.fine, self.cols * self.fine
+
+    def picture(self, rows: slice, cols: slice) -> UInt8[np.ndarray, "_ _"]:
+        """A rectangle of print pixels, made in strips."""
+        width = cols.stop - cols.start
+        grey = np.empty((rows.stop - rows.start, width), np.uint8)
+        step = max(1, _STRIP_PIXELS // width)
+        for first in range(rows.start, rows.stop, step):
+            last = min(first + step, rows.stop)
+            strip = self._luminance(slice(first, last), cols)
+            grey[first - rows.start : last - rows.start] = np.rint(255 * np.clip(strip, 0.0, 1.0))
+        return grey
+
+    def _luminance(self, rows: slice, cols: slice) -> np.ndarray:
+        wanted = (rows, cols)
+        own = [
+            slice(max(0, one.start // self.fine - _MARGIN_PX), min(n, -(-one.stop // self.fine) + _MARGIN_PX))
+            for one, n in zip(wanted, (self.rows, self.cols), strict=True)
+        ]
+        values = self.part(*own)
+        if self.fine == 1:
+            first, second = (
+                slice(one.start - mine.start, one.stop - mine.start)
+                for one, mine in zip(wanted, own, strict=True)
+            )
+            return values[first, second]
+        knots = spline_filter(values, order=3, mode="mirror")
+        # The middle of print pixel i lies at (i + 0.5) / fine - 0.5 pattern pixels.
+        offset = [
+            (one.start + 0.5) / self.fine - 0.5 - mine.start for one, mine in zip(wanted, own, strict=True)
+        ]
+        shape = tuple(one.stop - one.start for one in wanted)
+        scale = [1 / self.fine] * 2
+        # SciPy's types know one offset for all axes only; it takes one an axis.
+        return affine_transform(knots, scale, offset, shape, order=3, mode="mirror", prefilter=False)  # type: ignore[arg-type]
+
+
+def choose_pattern(folder: Path) -> Experiment:
+    """Give the scene the finest print that suits its coarsest camera, of the same seed. Raises BadInputError."""
+    with locked(folder):
+        experiment = open_experiment(folder)
+        scene = experiment.settings.scene
+        _print_of(scene)
+        camera = max((view.camera for view in scene.views), key=lambda one: camera_pixel_m(one, scene.room))
+        distance_m = scene.room.upper_m[1] - camera.position_m[1]
+        light = suited_print(camera, distance_m, getattr(scene.light.pattern, "seed", 0))
+        changed = experiment.settings.model_copy(update={"scene": replace(scene, light=light)})
+        return save_settings(folder, changed)
+
+
+def print_pattern_of(scene: Scene) -> PrintPattern:
+    """The scene's print. Raises BadInputError: a projector lights it, or the camera cannot see it."""
+    light = _print_of(scene)
+    period_px = period_in_camera_px(light, scene)
+    if period_px < LEAST_PERIOD_PX * (1 - 1e-6):
+        raise BadInputError(
+            f"The pattern's finest period is {1e3 * finest_period_m(light):.3g} mm, {period_px:.2g} pixels of the "
+            f"camera; expected {LEAST_PERIOD_PX:g} at least. Set scene.light.pixel_m = "
+            f"{light.pixel_m * LEAST_PERIOD_PX / period_px:.3g} in experiment.toml, or give --choose."
+        )
+    rows, cols = texture_size(scene.room, light.pixel_m)
+    fine = max(1, math.ceil(light.pixel_m / _PRINT_PIXEL_M - 1e-9))
+    return PrintPattern(light, rows, cols, fine, pattern_parts(light.pattern, rows, cols))
+
+
+def _print_of(scene: Scene) -> FixedTexture:
+    if isinstance(scene.light, FixedTexture):
+        return scene.light
+    raise BadInputError(
+        "The light of this experiment is a projector: there is nothing to print. Boards are printed by "
+        "`airlens print board`."
+    )
+
+
+def print_pattern(
+    experiment: Experiment,
+    paper: str,
+    out: Path | None = None,
+    overlap_m: float = 0.01,
+    on_sheet: OnSheet = lambda done, total: None,
+) -> tuple[Path, Printed]:
+    """Write the pattern as a PDF and what was printed into the experiment. Raises BadInputError."""
+    scene = experiment.settings.scene
+    pattern = print_pattern_of(scene)
+    layout = laid_out(*pattern.size_px, pattern.print_pixel_m, paper, overlap_m)
+    path = out or experiment.folder / PRINT_FOLDER / f"pattern-{layout.paper.name}.pdf"
+    period_px = period_in_camera_px(pattern.light, scene)
+
+    def draw(sheets: Sheets) -> None:
+        for number, tile in enumerate(layout.tiles, 1):
+            picture = pattern.picture(tile.rows, tile.cols)
+            footer = _footer(pattern, layout, tile, period_px)
+            sheets.add(layout.paper, picture, pattern.print_pixel_m, footer, _shared(pattern, layout, tile))
+            on_sheet(number, len(layout.tiles))
+
+    digest = write_sheets(path, f"airlens: pattern of {experiment.folder.name}", draw)
+    rows, cols = pattern.size_px
+    return path, keep_record(
+        experiment,
+        path,
+        digest,
+        what="pattern",
+        content=to_plain(pattern.light),
+        width_m=cols * pattern.print_pixel_m,
+        height_m=rows * pattern.print_pixel_m,
+        finest_period_m=finest_period_m(pattern.light),
+        finest_period_camera_px=period_px,
+        paper=layout.paper.name,
+        sheets=layout.sheets,
+        overlap_m=overlap_m,
+        print_pixel_m=pattern.print_pixel_m,
+    )
+
+
+def _footer(pattern: PrintPattern, layout: Layout, tile: Tile, period_px: float) -> tuple[str, str]:
+    kind = pattern.light.pattern
+    seed = "" if isinstance(kind, CheckerPattern) else f", seed {kind.seed}"
+    rows, cols = layout.sheets
+    return (
+        f"airlens {version()}: {kind.kind}{seed}, scale 1:1, pattern pixel {1e3 * pattern.light.pixel_m:.4g} mm, "
+        f"finest period {1e3 * finest_period_m(pattern.light):.3g} mm = {period_px:.2g} camera px",
+        f"Row {tile.row} of {rows} from the top, column {tile.col} of {cols} from the left, on {layout.paper.name}. "
+        "Inner marks: the next sheet's picture ends there.",
+    )
+
+
+def _shared(pattern: PrintPattern, layout: Layout, tile: Tile) -> Shared:
+    """How far the neighbours reach into this tile."""
+    by_place = {(one.row, one.col): one for one in layout.tiles}
+
+    def shared_m(row: int, col: int) -> float:
+        other = by_place.get((tile.row + row, tile.col + col))
+        if other is None:
+            return 0.0
+        mine, its = (tile.rows, other.rows) if row else (tile.cols, other.cols)
+        return (min(mine.stop, its.stop) - max(mine.start, its.start)) * pattern.print_pixel_m
+
+    return Shared(shared_m(0, -1), shared_m(0, 1), shared_m(-1, 0), shared_m(1, 0))

@@ -1,0 +1,198 @@
+"""Where an experiment stands, and what comes next: the one rule, for `airlens status` and for `airlens` alone."""
+
+import contextlib
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.calibrate.parts import Part, parts_of
+from app.errors import BadInputError
+from app.experiment.folder import (
+    Experiment,
+    finished,
+    interrupted,
+    open_experiment,
+    read_manifest,
+)
+from app.experiment.plan import PLAN_FILE
+from app.experiment.printed import is_of_the_scene, read_printed
+from app.experiment.rig_settings import V4l2CameraSettings
+from core.scene import FixedTexture
+
+
+@dataclass(frozen=True)
+class Next:
+    """The command that comes next, and why."""
+
+    command: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Whereabouts:
+    """What an experiment has, as sentences by their subject, and what comes next."""
+
+    experiment: str
+    title: str
+    has: dict[str, str]
+    next: Next
+
+
+def whereabouts(folder: Path, shown: str = "") -> Whereabouts:
+    """Look at an experiment; `shown` is how its folder is written in the next command. Raises BadInputError."""
+    experiment = open_experiment(folder)
+    has = {
+        "rig": _rig(experiment),
+        "plan": "made" if (experiment.folder / PLAN_FILE).is_file() else "none yet",
+        "print": _print(experiment),
+        "calibration": _calibration(parts_of(experiment)),
+        "captures": _captures(experiment),
+        "results": _results(experiment),
+    }
+    told = {name: text for name, text in has.items() if text}
+    following = next_step(experiment, shown or str(folder))
+    return Whereabouts(str(folder), experiment.settings.title, told, following)
+
+
+def next_step(experiment: Experiment, shown: str) -> Next:
+    """The first step of the work that is not done. Raises BadInputError for files that cannot be read."""
+    for rule in (_of_the_rig, _of_the_print, _of_the_calibration, _of_the_captures, _of_the_results):
+        found = rule(experiment, shown)
+        if found is not None:
+            return found
+    newest = experiment.latest_result()
+    return Next(
+        f"airlens export {shown}",
+        f"{newest / 'report.html'} is there to be read. Other programs read exports",
+    )
+
+
+def _of_the_rig(experiment: Experiment, shown: str) -> Next | None:
+    taken = finished(experiment.captures_folder)
+    if experiment.settings.rig.camera is None and not taken:
+        return Next(
+            "airlens devices --full",
+            "no camera is named: write one of these under [rig.camera] in experiment.toml",
+        )
+    if not taken and not (experiment.folder / PLAN_FILE).is_file():
+        return Next(f"airlens plan {shown}", "nothing is measured yet: see first what this rig would see")
+    return None
+
+
+def _of_the_print(experiment: Experiment, shown: str) -> Next | None:
+    """What must hang on the wall, or be held before the camera, of a rig that is no simulation."""
+    rig = experiment.settings.rig
+    if not isinstance(rig.camera, V4l2CameraSettings) or finished(experiment.captures_folder):
+        return None
+    if isinstance(experiment.settings.scene.light, FixedTexture):
+        printed = read_printed(experiment, "pattern")
+        if printed is None:
+            return Next(f"airlens print pattern {shown}", "the wall needs its pattern")
+        if not is_of_the_scene(printed, experiment):
+            return Next(
+                f"airlens print pattern {shown}", "the scene's pattern is another than the printed one"
+            )
+    if rig.board is None and _missing(experiment)[:1] == ["camera"]:
+        return Next(f"airlens print board {shown}", "the rig names no board to calibrate with")
+    return None
+
+
+def _of_the_calibration(experiment: Experiment, shown: str) -> Next | None:
+    missing = _missing(experiment)
+    if not missing:
+        return None
+    return Next(f"airlens calibrate {missing[0]} {shown}", f"not calibrated yet: {', '.join(missing)}")
+
+
+def _of_the_captures(experiment: Experiment, shown: str) -> Next | None:
+    frames = max(view.frames for view in experiment.settings.scene.views)
+    roles = _roles(experiment)
+    reasons = {"reference": "with still air", "flow": "with the air moving"}
+    for role, reason in reasons.items():
+        if not roles[role]:
+            return Next(
+                f"airlens capture {role} {shown} --frames {frames}",
+                f"the {role} is missing: take it {reason}",
+            )
+    return None
+
+
+def _of_the_results(experiment: Experiment, shown: str) -> Next | None:
+    command = f"airlens reconstruct {shown}"
+    if experiment.checkpoint_folder.is_dir():
+        return Next(command, "a reconstruction was stopped: it goes on from there")
+    results = finished(experiment.results_folder)
+    if not results:
+        return Next(command, "both captures are there")
+    used = read_manifest(results[-1]).get("captures", {})
+    newest = {role: experiment.latest_capture(role).name for role in ("reference", "flow")}
+    if isinstance(used, dict) and any(used.get(role, name) != name for role, name in newest.items()):
+        return Next(command, "there are newer captures than those of the newest result")
+    if not (results[-1] / "report.html").is_file():
+        return Next(f"airlens report {shown}", "the newest result has no report")
+    return None
+
+
+def _missing(experiment: Experiment) -> list[str]:
+    return [part.step.value for part in parts_of(experiment) if part.needed and part.state == "missing"]
+
+
+def _roles(experiment: Experiment) -> Counter[str]:
+    return Counter(str(read_manifest(folder).get("role")) for folder in finished(experiment.captures_folder))
+
+
+def _rig(experiment: Experiment) -> str:
+    rig, scene = experiment.settings.rig, experiment.settings.scene
+    camera = "no camera named" if rig.camera is None else f"{rig.camera_kind} camera"
+    if isinstance(rig.camera, V4l2CameraSettings):
+        camera = f"camera {rig.camera.device}"
+    light = "a printed pattern" if isinstance(scene.light, FixedTexture) else "a projector"
+    return f"{camera} before {light}; a room of {' x '.join(f'{size:g}' for size in scene.room.size_m)} m"
+
+
+def _print(experiment: Experiment) -> str:
+    if not isinstance(experiment.settings.scene.light, FixedTexture):
+        return ""
+    printed = read_printed(experiment, "pattern")
+    if printed is None:
+        return "none yet"
+    rows, cols = printed.sheets
+    state = "" if is_of_the_scene(printed, experiment) else ", of another pattern than the scene's"
+    return f"{rows * cols} sheets of {printed.paper}, {printed.created[:10]}{state}"
+
+
+def _calibration(parts: tuple[Part, ...]) -> str:
+    return ", ".join(f"{part.step.value} {part.state}" for part in parts)
+
+
+def _captures(experiment: Experiment) -> str:
+    roles = _roles(experiment)
+    counted = [f"{roles[role]} {role}" for role in ("reference", "flow")]
+    return ", ".join(counted) + _left(experiment.captures_folder)
+
+
+def _results(experiment: Experiment) -> str:
+    found = finished(experiment.results_folder)
+    newest = f"{len(found)}, the newest {found[-1].name}" if found else "none yet"
+    return newest + _left(experiment.results_folder)
+
+
+def _left(parent: Path) -> str:
+    left = [folder for folder in interrupted(parent) if not folder.name.startswith(".")]
+    return f", {len(left)} interrupted" if left else ""
+
+
+def each(folders: list[Path], shown: Callable[[Path], str] = str) -> list[tuple[Path, str, str]]:
+    """Every experiment of a data folder: where it is, its title, its next command or what is wrong with it."""
+    rows = []
+    for folder in folders:
+        title, following = "", ""
+        with contextlib.suppress(OSError):
+            try:
+                found = whereabouts(folder, shown(folder))
+                title, following = found.title, found.next.command
+            except BadInputError as error:
+                following = str(error)
+            rows.append((folder, title, following))
+    return rows
