@@ -58,8 +58,7 @@ class View:
     focal_m: float | None = None
     """Focal length of the lens."""
     drift_std_px: float = 1.0
-    """How far the mount may move the picture between two exposures, at its edge: one standard deviation each along
-    columns, along rows, of rotation and of magnification; 0 where it stands still."""
+    """Standard deviation of the mount's motion between exposures, at the picture's edge; 0: it stands still."""
 
     def __post_init__(self) -> None:
         check_range(

@@ -5,7 +5,7 @@ Colour becomes grey: a pattern has no colour.
 """
 
 import glob
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -125,7 +125,7 @@ class PictureFiles:
     def __exit__(self, *exception: object) -> None:
         self.close()
 
-    def _frames(self) -> Iterator[Pixels]:
+    def _frames(self) -> Generator[Pixels, None, None]:
         shape = None
         for file in self._files:
             for pixels in _read(file):
