@@ -124,7 +124,7 @@ def _manifest(
         "solver_s": solution.solver_s,
         "assumed": assumed,
         "wall_s": wall_s,
-        "captures": {"reference": captures.reference.folder.name, "flow": captures.flow.folder.name},
+        "captures": captures.names,
         "windows": [len(shift.displacement_px) for shift in measurement.shifts],
         "settings": to_plain(experiment.settings),
         "inputs": captures.inputs,

@@ -93,11 +93,13 @@ def take(
     name: str | None = None,
     source: Mapping[str, Any] | None = None,
     known: tuple[Verdict, ...] = (),
+    series: Mapping[str, Any] | None = None,
 ) -> TakenBurst:
     """Take one burst into a new folder below captures/, by `name` where that was given out already.
 
     `sequence` says which burst of how many it is. `source` says where the frames come from, where that is not the
-    rig; `known` are verdicts that the frames cannot tell. Raises AirlensError without room for it, DeviceError.
+    rig; `known` are verdicts that the frames cannot tell; `series` is its place between two references. Raises
+    AirlensError without room for it, DeviceError.
     """
     check_room(experiment.folder, plan, camera.info)
     name = name or new_id(experiment.captures_folder, plan.role)
@@ -112,6 +114,7 @@ def take(
         origin = dict(source) if source is not None else _rig(experiment, plan)
         origin |= known_pairs(conditions_of(experiment.settings, told))
         origin |= {} if sequence is None else {"sequence": sequence}
+        origin |= {} if series is None else {"series": dict(series)}
         return TakenBurst(burst, recorder.keep(burst, origin))
     except BaseException:
         recorder.leave()

@@ -28,6 +28,7 @@ def register(cli: typer.Typer) -> None:
     group = typer.Typer(no_args_is_help=True, help="Take bursts with the rig, or watch the shift live.")
     for role, text in _ROLES.items():
         group.command(role, help=text)(_command(role))
+    group.command()(series)
     group.command()(watch)
     cli.add_typer(group, name="capture")
 
@@ -119,6 +120,59 @@ def said(one) -> str:
         f"  {v.name} {v.value:.3g}: expected {v.expected}. {v.advice}" for v in burst.verdicts if not v.good
     ]
     return "\n".join(lines)
+
+
+def series(
+    experiment: Folder,
+    frames: Annotated[int, typer.Option(min=1, help="Frames in each mean.")] = 100,
+    exposure_s: Annotated[float | None, typer.Option(help="Exposure time [s] of all three.")] = None,
+    before_flow_s: Annotated[float, typer.Option(min=0.0, help="Wait so long before the flow [s].")] = 0.0,
+    before_reference_s: Annotated[
+        float, typer.Option(min=0.0, help="Wait so long before the second reference [s].")
+    ] = 0.0,
+    ask: Annotated[
+        bool, typer.Option("--ask/--no-ask", help="Wait for Enter before each burst, to change the air.")
+    ] = True,
+    as_json: AsJson = False,
+) -> None:
+    """Take reference, flow and reference again, and say how far the camera moved meanwhile."""
+    from rich.progress import Progress as Bar
+
+    from app.capture.burst import Watch, interruptible
+    from app.capture.series import take_series
+    from app.experiment.folder import open_experiment
+    from app.rig.open import air_of, open_camera
+    from drivers.burst import CapturePlan
+
+    opened, words = open_experiment(experiment), {"reference": "still air", "flow": "the air moving"}
+
+    def ready(role: "CaptureRole", place: int) -> None:
+        if ask:
+            typer.prompt(
+                f"{place + 1} of 3, {role}: {words[role]}. Enter when it is so",
+                default="",
+                show_default=False,
+                err=True,
+            )
+
+    with interruptible() as stopped, Bar(transient=True, disable=ask) as bar:
+        task = bar.add_task("series", total=frames)
+        watch = Watch(
+            progress=lambda now: bar.update(task, completed=now.done),
+            stop=lambda: "keep" if stopped() else None,
+        )
+        plan = CapturePlan("reference", frames, exposure_s)
+        found = take_series(
+            lambda role, place: open_camera(opened, air_of(role), moment=place),
+            opened,
+            plan,
+            (before_flow_s, before_reference_s),
+            watch=watch,
+            ready=ready,
+        )
+    for one in found.taken:
+        typer.echo(json.dumps(_summary(one)) if as_json else said(one))
+    typer.echo(json.dumps({"agree": found.agree, "said": found.said}) if as_json else found.said)
 
 
 def watch(

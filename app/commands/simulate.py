@@ -27,6 +27,10 @@ def simulate(
     frames: Annotated[int, typer.Option(min=1, help="Frames averaged in each capture.")] = 100,
     full_well: Annotated[float, typer.Option(help="Full well of a pixel [e-].")] = 10_000.0,
     drift_px: Annotated[float, typer.Option(min=0.0, help="Drift between the two exposures [px].")] = 0.1,
+    border: Annotated[
+        Literal["print", "bare"],
+        typer.Option(help="Beyond the wall: a still print, which drift is read from, or nothing to see."),
+    ] = "print",
     rig: Annotated[
         Literal["paper", "lab"],
         typer.Option(help="Where the optics stand: the paper's 30.5 m, or a lab's 4 m, projector diagonal."),
@@ -58,7 +62,7 @@ def simulate(
         baseline_m=rig_baseline_m if baseline is None else baseline,
         pattern_seed=seed,
     )
-    camera = SimulatedCameraSettings(seed=seed, drift_px=drift_px, noise_free=noise_free)
+    camera = SimulatedCameraSettings(seed=seed, drift_px=drift_px, border=border, noise_free=noise_free)
     with Progress(transient=True) as progress:
         tasks = {}
 

@@ -25,7 +25,7 @@ from pydantic import TypeAdapter
 
 from app.errors import AirlensError, BadInputError
 from app.experiment.capture_files import BurstImage, RawStack, decode_image, read_image, write_image
-from app.experiment.folder import Experiment, parse_manifest, write_manifest
+from app.experiment.folder import Experiment, finished, parse_manifest, read_manifest, write_manifest
 from app.files.durable import make_folder, sync, write_json
 from app.files.provenance import sha256
 from app.files.reading import inside, reading
@@ -53,30 +53,59 @@ class Capture:
 
 @dataclass(frozen=True)
 class CapturePair:
-    """The two captures that a measurement compares."""
+    """The two captures that a measurement compares, and a second reference that was taken after them, or none."""
 
     reference: Capture
     flow: Capture
+    after: Capture | None = None
+
+    @property
+    def names(self) -> dict[str, str]:
+        """The folders' names by their part in the measurement."""
+        parts = {"reference": self.reference, "flow": self.flow, "after": self.after}
+        return {part: capture.folder.name for part, capture in parts.items() if capture is not None}
 
     @property
     def inputs(self) -> dict[str, dict[str, str]]:
         """Every file that was read, with its capture and its hash, as a result's manifest names them."""
         return {
-            f"{capture.role}/{name}": {
+            f"{role}/{name}": {
                 "capture": capture.folder.name,
                 "file": name,
                 "sha256": digest,
             }
-            for capture in (self.reference, self.flow)
+            for role, capture in (("reference", self.reference), ("flow", self.flow), ("after", self.after))
+            if capture is not None
             for name, digest in capture.sha256.items()
         }
 
 
 def newest_pair(experiment: Experiment) -> CapturePair:
-    """The newest finished reference and flow. Raises BadInputError when one is missing or not as it was kept."""
-    return CapturePair(
-        load_capture(experiment.latest_capture("reference")), load_capture(experiment.latest_capture("flow"))
-    )
+    """The newest finished reference and flow; of a flow between two references, both of these.
+
+    Raises BadInputError when one is missing or not as it was kept.
+    """
+    flow = load_capture(experiment.latest_capture("flow"))
+    around = _references_around(experiment, flow)
+    if around is None:
+        return CapturePair(load_capture(experiment.latest_capture("reference")), flow)
+    before, after = around
+    return CapturePair(load_capture(before), flow, load_capture(after))
+
+
+def _references_around(experiment: Experiment, flow: Capture) -> tuple[Path, Path] | None:
+    """The references of the series that a flow is of, where it has both and no newer reference was taken since."""
+    series = flow.manifest.get("origin", {}).get("series")
+    if series is None:
+        return None
+    places = {}
+    for folder in finished(experiment.captures_folder):
+        of = read_manifest(folder).get("origin", {}).get("series", {})
+        if of.get("id") == series["id"]:
+            places[of["place"]] = folder
+    if not {0, 2} <= set(places) or experiment.latest_capture("reference") != places[2]:
+        return None
+    return places[0], places[2]
 
 
 def write_capture(

@@ -23,6 +23,8 @@ class SimulatedCameraSettings(Strict):
     """Of noise and drift."""
     drift_px: Annotated[float, Field(ge=0, le=20)] = 0.0
     """How far the camera moves between reference and flow."""
+    border: Literal["print", "bare"] = "print"
+    """What is beyond the wall: a still print, or nothing to see."""
     noise_free: bool = False
     """Whether its frames have no noise."""
 

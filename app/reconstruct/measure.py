@@ -8,7 +8,7 @@ from scipy.ndimage import uniform_filter
 
 from app.errors import BadInputError
 from app.experiment.captures import Capture, CapturePair
-from app.reconstruct.drift import Exposures, without_known_drift
+from app.reconstruct.drift import Agreement, Exposures, agreement, mount, without_known_drift
 from core.camera_noise import frame_variance, scattered_variance
 from core.displacement import resolve_window_px, window_centres
 from core.drift import Similarity, move_image
@@ -41,7 +41,7 @@ def measure(captures: CapturePair, scene: Scene) -> Measurement:
     _check_captures(reference, flow, scene)
     shifts, drifts, notes = [], [], []
     for index, view in enumerate(scene.views):
-        shift, drift, note = _measure_view(scene, index, view, reference, flow)
+        shift, drift, note = _measure_view(scene, index, view, captures)
         shifts.append(shift)
         drifts.append(drift)
         notes.append(note)
@@ -69,21 +69,48 @@ def _variance(capture: Capture, index: int, view: View) -> np.ndarray:
 
 
 def _measure_view(
-    scene: Scene, index: int, view: View, reference: Capture, flow: Capture
+    scene: Scene, index: int, view: View, captures: CapturePair
 ) -> tuple[ShiftMeasurement, Similarity, str]:
-    before, after = reference.images[index], flow.images[index]
-    variance = _variance(reference, index, view) + _variance(flow, index, view)
+    exposures = _exposures(scene, index, captures.reference, captures.flow)
+    shape, window_px = exposures.before.shape, exposures.window_px
+    centres = window_centres(shape, window_px)
+    in_room = sees_wall(scene, index, centres, margin_px=float(window_px))
+    # The wall's own edge, seen through the room's air, must not reach into a window that counts as still.
+    reach_px = float(window_px + len(derivative_filter()) // 2)
+    beyond = ~sees_wall(scene, index, centres, margin_px=-reach_px)
+    prior, said = mount(view.drift_std_px), ""
+    if captures.after is not None:
+        found = between_references(captures, scene, index)
+        prior, said = found.at(_share(captures.reference, captures.flow, captures.after)), f"{found.said} "
+    shift, drift, note = without_known_drift(exposures, in_room, beyond & _whole(centres, shape), prior)
+    return _in_room(shift, in_room, drift, said + note)
+
+
+def between_references(captures: CapturePair, scene: Scene, index: int = 0) -> Agreement:
+    """How the camera moved between the references around a flow. Raises BadInputError where there is one only."""
+    if captures.after is None:
+        raise BadInputError(
+            "The newest flow was not taken between two references. Take all three: airlens capture series"
+        )
+    exposures = _exposures(scene, index, captures.reference, captures.after)
+    centres = window_centres(exposures.before.shape, exposures.window_px)
+    return agreement(exposures, sees_wall(scene, index, centres, margin_px=float(exposures.window_px)))
+
+
+def _exposures(scene: Scene, index: int, first: Capture, second: Capture) -> Exposures:
+    before, after = first.images[index], second.images[index]
+    view = scene.views[index]
+    variance = _variance(first, index, view) + _variance(second, index, view)
     window_px = resolve_window_px(scene, view)
     # One weight a window: pixel by pixel the darkest would weigh a thousandfold, and with them what the
     # model leaves out there (clipping, aliasing), which biases a drift of 0.1 px by 1 %.
-    exposures = Exposures(before.mean, after.mean, uniform_filter(variance, 2 * window_px), window_px)
-    centres = window_centres(before.mean.shape, window_px)
-    in_room = sees_wall(scene, index, centres, margin_px=float(window_px))
-    beyond = ~sees_wall(scene, index, centres, margin_px=-float(window_px))
-    shift, drift, note = without_known_drift(
-        exposures, in_room, beyond & _whole(centres, before.mean.shape), view.drift_std_px
-    )
-    return _in_room(shift, in_room, drift, note)
+    return Exposures(before.mean, after.mean, uniform_filter(variance, 2 * window_px), window_px)
+
+
+def _share(*captures: Capture) -> float:
+    """When the second of three captures of a series was taken, as a share of the time from the first to the last."""
+    first_s, flow_s, last_s = (float(one.manifest["origin"]["series"]["began_s"]) for one in captures)
+    return float(np.clip((flow_s - first_s) / (last_s - first_s), 0.0, 1.0)) if last_s > first_s else 0.5
 
 
 def _in_room(

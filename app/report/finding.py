@@ -52,7 +52,8 @@ def read_finding(experiment: Experiment, folder: Path) -> Finding:
     def captures() -> CapturePair:
         names = manifest["captures"]
         kept = experiment.captures_folder
-        return CapturePair(load_capture(kept / names["reference"]), load_capture(kept / names["flow"]))
+        after = load_capture(kept / names["after"]) if "after" in names else None
+        return CapturePair(load_capture(kept / names["reference"]), load_capture(kept / names["flow"]), after)
 
     solution = read_result(folder / "result.nc")
     return Finding(experiment, folder.name, manifest, solution, lambda: read_shifts(folder), captures)

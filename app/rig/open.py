@@ -39,11 +39,15 @@ AirState = Literal["still", "moving"]
 FRAME_SEED = 1_000_003
 
 
-def open_camera(experiment: Experiment, air: AirState, view: int = 0) -> Camera:
-    """Open the experiment's camera. `air` says what a simulated room does; a real room is as it is."""
+def open_camera(experiment: Experiment, air: AirState, view: int = 0, moment: int | None = None) -> Camera:
+    """Open the experiment's camera. `air` says what a simulated room does; a real room is as it is.
+
+    A simulated mount walks: `moment` is how many steps it has taken, by default one where the air moves.
+    """
     settings = named_camera(experiment)
     if isinstance(settings, SimulatedCameraSettings):
-        return _simulated_camera(experiment, settings, air, view)
+        steps = int(air == "moving") if moment is None else moment
+        return _simulated_camera(experiment, settings, air, view, steps)
     return open_v4l2(settings)
 
 
@@ -164,16 +168,16 @@ def _sensor(scene: Scene, settings: SimulatedCameraSettings, view: int) -> Senso
 
 
 def _simulated_camera(
-    experiment: Experiment, settings: SimulatedCameraSettings, air: AirState, view: int
+    experiment: Experiment, settings: SimulatedCameraSettings, air: AirState, view: int, steps: int
 ) -> SimulatedCamera:
     scene = experiment.settings.scene
     sensor = _sensor(scene, settings, view)
-    if air == "moving":
-        scene = drifted(scene, view, settings.drift_px, settings.seed)
+    for step in range(steps):
+        scene = drifted(scene, view, settings.drift_px, settings.seed + step)
     image = _memo(lambda: _render(experiment, settings, scene, air, view))
     return SimulatedCamera(
         image,
-        seed=2 * settings.seed + (air == "moving"),
+        seed=2 * settings.seed + steps,
         noise=sensor,
         exposure_s=settings.exposure_s,
         name=f"simulated {scene.views[view].name}",
@@ -188,7 +192,7 @@ def _render(
     else:
         volume = read_volume(experiment.file(settings.room))
         image = render_flow(scene, volume_field(volume, scene), view)
-    return _framed(image, scene, view)
+    return _framed(image, scene, view) if settings.border == "print" else image
 
 
 def _framed(

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import ndimage
 
-from app.reconstruct.drift import Exposures, without_known_drift
+from app.reconstruct.drift import Exposures, agreement, mount, without_known_drift
 from core.displacement import window_centres
 from core.motion import edge_basis
 from tests.core.test_displacement import band_limited
@@ -43,7 +43,7 @@ def air_everywhere(x, y):
 
 
 def drift_of(pictures):
-    return without_known_drift(pictures, ~BEYOND, BEYOND, 1.0)
+    return without_known_drift(pictures, ~BEYOND, BEYOND, mount(1.0))
 
 
 def test_a_still_border_gives_the_creep_and_one_behind_air_is_refused():
@@ -71,6 +71,23 @@ def test_a_bare_border_says_nothing_and_the_creep_stays_in_the_shifts():
 
 
 def test_a_camera_that_is_stated_to_stand_still_is_believed_where_nothing_says_otherwise():
-    shift, _, note = without_known_drift(exposures(2, still_air), ~BEYOND, BEYOND & False, 0.0)
+    shift, _, note = without_known_drift(exposures(2, still_air), ~BEYOND, BEYOND & False, mount(0.0))
     assert "stand still" in note
     assert shift.motion is None
+
+
+def test_references_that_differ_by_more_than_a_motion_of_the_camera_are_told():
+    for seed in range(3):
+        still = agreement(exposures(seed, lambda x, y: (0.0 * x, 0.0 * y)), ~BEYOND)
+        assert still.agree
+        np.testing.assert_allclose(still.edge_px, CREEP_PX, atol=4e-3)
+        stirred = agreement(exposures(seed, air_everywhere), ~BEYOND)
+        assert not stirred.agree
+        assert "air was not still" in stirred.said
+
+
+def test_a_motion_between_two_references_is_known_best_close_to_one_of_them():
+    found = agreement(exposures(1, lambda x, y: (0.0 * x, 0.0 * y)), ~BEYOND)
+    middle, late = found.at(0.5), found.at(0.9)
+    assert late.std_px < 0.7 * middle.std_px
+    assert late.mean.column_px > 1.7 * middle.mean.column_px > 0.0
