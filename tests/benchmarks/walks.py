@@ -9,17 +9,17 @@ import argparse
 import json
 import logging
 import random
-import threading
 import time
 
 from hypothesis import Phase, seed, settings
 from hypothesis.stateful import run_state_machine_as_test
 
-from tests.walks.faults import Killed
+from tests.walks.faults import silent_deaths
 from tests.walks.test_walks import QUIET
 from tests.walks.walk import TALLY, Walk
 
 
+@silent_deaths()
 def main() -> None:
     """Parse the options and print the record."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -28,7 +28,6 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     logging.disable(logging.CRITICAL)
-    threading.excepthook = lambda told: None if told.exc_type is Killed else threading.__excepthook__(told)
     began_s, cpu_s, number = time.monotonic(), time.process_time(), random.Random(options.seed)
     # In portions: so many walks at once are drawn ever more alike.
     while TALLY["walks"] < options.walks:

@@ -23,6 +23,17 @@ class Killed(SystemExit):
     """The process ends here; a thread ends silently."""
 
 
+@contextlib.contextmanager
+def silent_deaths() -> Iterator[None]:
+    """A thread that the fault killed has no unhandled exception: its process would be gone."""
+    told = threading.excepthook
+    threading.excepthook = lambda about: None if about.exc_type is Killed else told(about)
+    try:
+        yield
+    finally:
+        threading.excepthook = told
+
+
 class Machine:
     """What is wrong with disk, clock and process now."""
 
