@@ -85,10 +85,11 @@ def newest_pair(experiment: Experiment) -> CapturePair:
 
     Raises BadInputError when one is missing or not as it was kept.
     """
+    newest = experiment.latest_capture("reference")
     flow = load_capture(experiment.latest_capture("flow"))
     around = _references_around(experiment, flow)
     if around is None:
-        return CapturePair(load_capture(experiment.latest_capture("reference")), flow)
+        return CapturePair(load_capture(newest), flow)
     before, after = around
     return CapturePair(load_capture(before), flow, load_capture(after))
 
