@@ -75,8 +75,8 @@ def _measure_view(
     shape, window_px = exposures.before.shape, exposures.window_px
     centres = window_centres(shape, window_px)
     in_room = sees_wall(scene, index, centres, margin_px=float(window_px))
-    # The wall's own edge, seen through the room's air, must not reach into a window that counts as still: neither into
-    # its half width nor into that of the gradient's filter.
+    # The wall's own edge, seen through the room's air, must not reach into a window that counts as still, nor into
+    # the filter of its gradient.
     reach_px = 0.5 * window_px + len(derivative_filter()) // 2
     beyond = ~sees_wall(scene, index, centres, margin_px=-reach_px)
     prior, said = mount(view.drift_std_px), ""

@@ -30,8 +30,8 @@ from app.report.finding import Finding, read_finding
 from app.report.indoor import age_of_air, draught_percent, indoor, told
 from app.volume.score import truth_at
 from core.displacement import standard_deviation_px
+from core.drift import nearly_still
 from core.occupied import HEAD_M, at_height
-from core.problem import ShiftMeasurement
 from core.result import Solution
 from core.scene import Scene
 
@@ -103,7 +103,8 @@ def summary(finding: Finding) -> tuple[str, ...]:
 
 
 def _seen(finding: Finding) -> str:
-    shift: ShiftMeasurement = finding.shifts()[0]
+    # A motion of the camera that is still in the shifts says nothing of the air.
+    shift = nearly_still(finding.shifts()[0])
     size = np.linalg.norm(shift.displacement_px, axis=1)
     noise = float(np.median(standard_deviation_px(shift)))
     ratio = float(np.median(size)) / noise
@@ -187,7 +188,13 @@ def _images(finding: Finding) -> Iterable[Picture]:
 
 def _shifts(finding: Finding) -> Iterable[Picture]:
     for shift in finding.shifts():
-        yield Picture(as_data_uri(shift_figure(shift)), f"Measured shift, windows of {shift.window_px} px.")
+        without = (
+            " What a motion of the camera would explain is taken out." if shift.motion is not None else ""
+        )
+        yield Picture(
+            as_data_uri(shift_figure(nearly_still(shift))),
+            f"Measured shift, windows of {shift.window_px} px.{without}",
+        )
 
 
 def _air(finding: Finding) -> Iterable[Picture]:
