@@ -46,4 +46,8 @@ BENCHES = {
         "app.bench.tradeoff",
         "Sweep presets, sizes, frames and light over rooms; find what is best at each price.",
     ),
+    "world": (
+        "app.bench.world",
+        "T, u and their intervals under each nuisance of a real rig, alone and all together.",
+    ),
 }

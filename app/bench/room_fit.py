@@ -10,22 +10,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 import typer
 
 from app.reconstruct.problem import with_scene
 from app.volume.file import RoomVolume, read_volume
 from app.volume.measurement import synthetic_problem
 from app.volume.scene import RIG_PLACES, Information, RigName, RigOptions
-from app.volume.score import score_solution, values_at
-from core.metrics import inner
+from app.volume.score import coverage, score_solution
 from core.problem import Problem
-from core.result import Solution
 from core.scene import FlowModel, Inlet, Scene
 from core.solve.room import RoomSettings, solve_room
 
 _CAMERA_PX, _WINDOW_PX, _FRAMES = (1024, 768), 8, 100 * 16 * 16
-_SIGMAS = 1.96
 
 
 def register(bench: typer.Typer) -> None:
@@ -118,22 +114,6 @@ def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dic
         "wall_s": solution.solver_s,
         "outcome": solution.outcome.name,
         "notes": list(solution.notes),
-    }
-
-
-def coverage(solution: Solution, volume: RoomVolume) -> dict[str, float]:
-    """Share of the points whose truth lies within 1.96 standard deviations; p about its mean."""
-
-    def within(found: Any, std: Any, truth: np.ndarray, *, level: bool = True) -> float:
-        error = inner(values_at(volume, solution, found)) - inner(truth)
-        error = error if level else error - error.mean()
-        return float(np.mean(np.abs(error) <= _SIGMAS * inner(values_at(volume, solution, std))))
-
-    s = solution
-    return {
-        "T_within": within(s.temperature_k, s.temperature_std_k, volume.temperature_k),
-        "u_within": within(s.velocity_m_s, s.velocity_std_m_s, volume.velocity_m_s),
-        "p_within": within(s.pressure_m2_s2, s.pressure_std_m2_s2, volume.pressure_m2_s2, level=False),
     }
 
 

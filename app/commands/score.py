@@ -47,6 +47,9 @@ def score_table(scores: dict[str, Any]) -> Table:
             table.add_row(f"{label}, relative", _number(scores[name]["rel"]), f"{label} = 0: 1")
     if scores["u"] is not None:
         table.add_row("velocity in the jet, relative", _number(scores["u"]["jet_rel"]), "")
+    held = {"T": scores["T_within"], "u": scores["u_within"], "p": scores["p_within"]}
+    told = ", ".join(f"{name} {100 * share:.0f} %" for name, share in held.items() if share is not None)
+    table.add_row("points within their 95 % intervals", told or "-", "wanted: 90 to 98 %")
     table.add_row("solver", f"{scores['solver_s']:.1f} s", f"outcome {scores['outcome']}")
     return table
 

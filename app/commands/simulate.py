@@ -26,11 +26,29 @@ def simulate(
     camera_px: Size = "4096x3072",
     frames: Annotated[int, typer.Option(min=1, help="Frames averaged in each capture.")] = 100,
     full_well: Annotated[float, typer.Option(help="Full well of a pixel [e-].")] = 10_000.0,
-    drift_px: Annotated[float, typer.Option(min=0.0, help="Drift between the two exposures [px].")] = 0.1,
+    world: Annotated[
+        Literal["ideal", "lab"],
+        typer.Option(
+            help="lab: blur, a lamp that ripples, things before the wall, misread entries, and so on."
+        ),
+    ] = "ideal",
+    nuisance: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", help="One nuisance of the world, such as blur_px=0.6; may be given several times."
+        ),
+    ] = None,
+    drift_px: Annotated[
+        float | None, typer.Option(min=0.0, help="Drift between exposures [px]: 0.1, in a lab 0.3.")
+    ] = None,
     border: Annotated[
-        Literal["print", "bare"],
-        typer.Option(help="Beyond the wall: a still print, which drift is read from, or nothing to see."),
-    ] = "print",
+        Literal["print", "bare"] | None,
+        typer.Option(help="Beyond the wall: a still print (ideal), or nothing to see (lab)."),
+    ] = None,
+    misread: Annotated[
+        bool | None,
+        typer.Option("--misread/--exact", help="Whether entries are as wrong as stated; in a lab they are."),
+    ] = None,
     rig: Annotated[
         Literal["paper", "lab"],
         typer.Option(help="Where the optics stand: the paper's 30.5 m, or a lab's 4 m, projector diagonal."),
@@ -48,8 +66,8 @@ def simulate(
     seed: Annotated[int, typer.Option(help="Seed of pattern, noise and drift.")] = 0,
 ) -> None:
     """Make a complete experiment from a room volume: scene, calibration, reference and flow captures."""
-    from app.experiment.rig_settings import SimulatedCameraSettings
     from app.simulate.experiment import simulate as run
+    from app.simulate.worlds import WORLDS, changed
     from app.volume.scene import RIG_PLACES, RigOptions
 
     rig_stand_off_m, rig_baseline_m = RIG_PLACES[rig]
@@ -62,7 +80,8 @@ def simulate(
         baseline_m=rig_baseline_m if baseline is None else baseline,
         pattern_seed=seed,
     )
-    camera = SimulatedCameraSettings(seed=seed, drift_px=drift_px, border=border, noise_free=noise_free)
+    shown = changed(WORLDS[world], nuisance or [], drift_px, border, misread)
+    camera = shown.camera(seed, noise_free)
     with Progress(transient=True) as progress:
         tasks = {}
 
@@ -71,7 +90,7 @@ def simulate(
                 tasks[name] = progress.add_task(f"{name} capture", total=total)
             progress.update(tasks[name], completed=done)
 
-        run(truth, experiment, options, information, camera, stage)
+        run(truth, experiment, options, information, camera, stage, misreads=shown.misreads)
     typer.echo(f"{experiment}: reference and flow captured. Next: airlens reconstruct {experiment}")
 
 

@@ -10,6 +10,34 @@ from calibration.board import Board, CharucoBoard, Chessboard, CircleGrid
 from calibration.errors import CalibrationError
 
 
+class World(Strict):
+    """What spoils the pictures of a simulated rig, each by itself; 0 is without it.
+
+    `app.rig.nuisances` says how each acts. A shake, a lamp and a focus differ from burst to burst, a lens does not.
+    """
+
+    blur_px: Annotated[float, Field(ge=0, le=20)] = 0.0
+    """Blur of the lens: standard deviation of its spot."""
+    vignetting: Annotated[float, Field(ge=0, le=0.95)] = 0.0
+    """Share of the light that is missing in the picture's corners."""
+    vibration_px: Annotated[float, Field(ge=0, le=20)] = 0.0
+    """Shake within a burst: standard deviation, half as much to half as much again."""
+    breathing_px: Annotated[float, Field(ge=0, le=20)] = 0.0
+    """How far the focus moves the picture's edge, in or out, from burst to burst."""
+    lamp: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    """Share by which the light changes from burst to burst."""
+    ripple: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    """Share by which the light ripples over the wall, otherwise in each burst."""
+    ripple_period_px: Annotated[float, Field(gt=1, le=10_000)] = 60.0
+    """Period of that ripple."""
+    flicker: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    """Share by which the light changes from frame to frame."""
+    hot_pixels: Annotated[float, Field(ge=0, le=0.1)] = 0.0
+    """Share of the pixels that are always full."""
+    covered: Annotated[float, Field(ge=0, le=0.9)] = 0.0
+    """Share of the picture behind things before the wall; every second one moves between bursts."""
+
+
 class SimulatedCameraSettings(Strict):
     """A camera twin that looks at a room volume in the experiment folder."""
 
@@ -27,6 +55,8 @@ class SimulatedCameraSettings(Strict):
     """What is beyond the wall: a still print, or nothing to see."""
     noise_free: bool = False
     """Whether its frames have no noise."""
+    world: World = World()
+    """What spoils its pictures."""
 
 
 class V4l2CameraSettings(Strict):

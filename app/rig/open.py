@@ -1,8 +1,6 @@
 """From the `[rig]` table to open devices. The only module that knows the simulated twins."""
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Literal
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
@@ -14,13 +12,10 @@ from app.experiment.rig_settings import CameraSettings, SimulatedCameraSettings
 from app.rig.cameras import open_v4l2
 from app.rig.practice_room import PracticeRoom
 from app.rig.projectors import open_real_projector
+from app.rig.rendered import AirState, seen_picture
 from app.rig.stage import RealStage, Stage, Task
-from app.volume.file import RoomVolume, read_volume
 from calibration.board import Board
-from core.fields import GridField
-from core.geometry import Box, Optics, crop, rotation_matrix, rotation_vector
-from core.plan.print_choice import suited_print
-from core.render import render_flow, render_reference
+from core.geometry import Optics
 from core.scene import ProjectedPattern, Scene
 from drivers.burst import CaptureRole
 from drivers.clock import SystemClock
@@ -33,10 +28,6 @@ from drivers.v4l2 import list_devices
 
 # A lamp that warms up for longer than an hour is a slip.
 LONGEST_S = 3600.0
-AirState = Literal["still", "moving"]
-
-# The print around a simulated room: as fine as the pattern, but another one.
-FRAME_SEED = 1_000_003
 
 
 def open_camera(experiment: Experiment, air: AirState, view: int = 0, moment: int | None = None) -> Camera:
@@ -171,111 +162,15 @@ def _simulated_camera(
     experiment: Experiment, settings: SimulatedCameraSettings, air: AirState, view: int, steps: int
 ) -> SimulatedCamera:
     scene = experiment.settings.scene
-    sensor = _sensor(scene, settings, view)
-    for step in range(steps):
-        scene = drifted(scene, view, settings.drift_px, settings.seed + step)
-    image = _memo(lambda: _render(experiment, settings, scene, air, view))
+    image = _memo(lambda: seen_picture(experiment, settings, air, view, steps))
     return SimulatedCamera(
         image,
         seed=2 * settings.seed + steps,
-        noise=sensor,
+        noise=_sensor(scene, settings, view),
+        flicker=settings.world.flicker,
         exposure_s=settings.exposure_s,
         name=f"simulated {scene.views[view].name}",
     )
-
-
-def _render(
-    experiment: Experiment, settings: SimulatedCameraSettings, scene: Scene, air: AirState, view: int
-) -> Float32[np.ndarray, "rows cols"]:
-    if air == "still":
-        image = render_reference(scene, view)
-    else:
-        volume = read_volume(experiment.file(settings.room))
-        image = render_flow(scene, volume_field(volume, scene), view)
-    return _framed(image, scene, view) if settings.border == "print" else image
-
-
-def _framed(
-    image: Float32[np.ndarray, "rows cols"], scene: Scene, view: int
-) -> Float32[np.ndarray, "rows cols"]:
-    """The picture in a printed frame: what lies beyond the wall is still, and shows the camera's drift."""
-    beyond = image == 0
-    room, reach_m = scene.room, 0.1 * max(scene.room.size_m)
-    (x0, y0, z0), (x1, y1, z1) = room.lower_m, room.upper_m
-    wide = Box(lower_m=(x0 - reach_m, y0, z0 - reach_m), upper_m=(x1 + reach_m, y1, z1 + reach_m))
-    camera = scene.views[view].camera
-    print_ = suited_print(camera, y1 - camera.position_m[1], FRAME_SEED)
-    frame_scene = replace(scene, room=wide, light=print_)
-    framed = image.copy()
-    for strip in _strips_around(~beyond):
-        part = replace(scene.views[view], camera=crop(camera, *strip))
-        views = tuple(part if i == view else v for i, v in enumerate(scene.views))
-        drawn = render_reference(replace(frame_scene, views=views), view)
-        framed[strip] = np.where(beyond[strip], drawn, image[strip])
-    return framed
-
-
-def _strips_around(inside: np.ndarray) -> list[tuple[slice, slice]]:
-    """The four strips (rows, columns) around the bounding box of what is inside."""
-    rows, cols = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
-    if not len(rows):
-        return [(slice(0, inside.shape[0]), slice(0, inside.shape[1]))]
-    # One pixel more, for a box that is not quite upright in the picture.
-    top, bottom = int(rows[0]) + 2, int(rows[-1]) - 1
-    left, right = int(cols[0]) + 2, int(cols[-1]) - 1
-    strips = [
-        (slice(0, top), slice(0, inside.shape[1])),
-        (slice(bottom, inside.shape[0]), slice(0, inside.shape[1])),
-        (slice(top, bottom), slice(0, left)),
-        (slice(top, bottom), slice(right, inside.shape[1])),
-    ]
-    return [(r, c) for r, c in strips if r.stop > r.start and c.stop > c.start]
-
-
-def volume_field(volume: RoomVolume, scene: Scene) -> GridField:
-    """The volume's excess refractivity on evenly spaced vertices."""
-    excess_k = _evenly_spaced(volume).astype(np.float64) - scene.air.ambient_temperature_k
-    excess = -scene.air.ambient_refractivity * excess_k / (scene.air.ambient_temperature_k + excess_k)
-    room: Box = scene.room
-    return GridField(room.lower_m, room.upper_m, excess.astype(np.float32))
-
-
-def drifted(scene: Scene, view: int, drift_px: float, seed: int) -> Scene:
-    """The scene with one camera moved between exposures: a shift of `drift_px` and a roll as large at the edge."""
-    if drift_px == 0.0:
-        return scene
-    rng = np.random.default_rng([seed, 77])
-    camera = scene.views[view].camera
-    angle = rng.uniform(0, 2 * np.pi)
-    roll = rng.choice([-1.0, 1.0]) * drift_px / camera.width_px
-    moved = _moved(camera, drift_px * np.cos(angle), drift_px * np.sin(angle), roll)
-    views = list(scene.views)
-    views[view] = replace(views[view], camera=moved)
-    return replace(scene, views=tuple(views))
-
-
-def _moved(camera: Optics, column_px: float, row_px: float, roll_rad: float) -> Optics:
-    cx, cy = camera.principal_px
-    rotation = rotation_matrix((0.0, 0.0, float(roll_rad))) @ camera.rotation
-    return replace(
-        camera,
-        principal_px=(float(cx + column_px), float(cy + row_px)),
-        rotation_rad=rotation_vector(rotation),
-    )
-
-
-def _evenly_spaced(volume: RoomVolume) -> Float32[np.ndarray, "nx ny nz"]:
-    """Temperature on evenly spaced vertices, at least as fine as the volume's own."""
-    temperature = volume.temperature_k
-    for index, axis in enumerate((volume.x_m, volume.y_m, volume.z_m)):
-        steps = np.diff(axis)
-        if steps.max() - steps.min() > 1e-4 * steps.max():
-            count = int(np.ceil((axis[-1] - axis[0]) / steps.min())) + 1
-            even = np.linspace(axis[0], axis[-1], min(count, 512))
-            temperature = np.apply_along_axis(
-                lambda line, even=even, axis=axis: np.interp(even, axis, line), index, temperature
-            )
-    return temperature.astype(np.float32)
 
 
 def _memo(

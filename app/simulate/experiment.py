@@ -12,6 +12,7 @@ from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.files.durable import durable_folder, write_durably, write_text
 from app.rig.open import air_of, open_camera
 from app.volume.file import RoomVolume, read_volume
+from app.volume.misread import misread
 from app.volume.scene import Information, RigOptions, room_scene, write_plane
 from calibration.bundle import given_bundle, to_json
 from core.scene import PlaneField, ProjectedPattern, Scene
@@ -29,9 +30,12 @@ def simulate(
     information: Information,
     camera: SimulatedCameraSettings,
     on_stage: OnStage = lambda stage, done, total: None,
+    *,
+    misreads: bool = False,
 ) -> Path:
     """Make an experiment folder from a volume: scene, calibration, reference and flow captures.
 
+    With `misreads` what is known of the boundary is as wrong as its deviations say, by the camera's seed.
     The whole folder appears at once, when it is complete. The truth is copied into it for the simulated
     rig and `score`; no reconstruction reads it. Raises BadInputError, SettingError.
     """
@@ -39,6 +43,7 @@ def simulate(
         raise BadInputError(f"{folder} is not empty; give a new folder for the experiment.")
     volume = read_volume(truth_path)
     scene = room_scene(volume, options, information)
+    scene = misread(scene, camera.seed) if misreads else scene
     with durable_folder(folder) as unfinished:
         _fill(unfinished, truth_path, volume, scene, information, camera, on_stage)
     return folder

@@ -10,8 +10,11 @@ from scipy.interpolate import RegularGridInterpolator
 from app.experiment.folder import open_experiment, read_manifest
 from app.experiment.results import read_result
 from app.volume.file import RoomVolume, read_volume
-from core.metrics import score_pressure, score_temperature, score_velocity
+from core.metrics import inner, score_pressure, score_temperature, score_velocity
 from core.result import Solution
+
+# A 95 % interval.
+_SIGMAS = 1.96
 
 
 def score_experiment(folder: Path, truth_path: Path, result: Path | None = None) -> dict[str, Any]:
@@ -27,6 +30,7 @@ def score_experiment(folder: Path, truth_path: Path, result: Path | None = None)
         "preset": manifest.get("preset"),
         "information": experiment.settings.information,
         **scores,
+        **coverage(solution, read_volume(truth_path)),
         "outcome": solution.outcome.name,
         "solver_s": solution.solver_s,
         "wall_s": manifest.get("wall_s"),
@@ -52,6 +56,24 @@ def score_solution(solution: Solution, truth: RoomVolume) -> dict[str, Any]:
             values_at(truth, solution, solution.pressure_m2_s2), truth.pressure_m2_s2
         )
     return scores
+
+
+def coverage(solution: Solution, truth: RoomVolume) -> dict[str, float | None]:
+    """Share of the inner points whose truth is in its 95 % interval, or None; p is compared about its mean."""
+
+    def within(found: Any, std: Any, values: np.ndarray, *, level: bool = True) -> float | None:
+        if found is None or std is None:
+            return None
+        error = inner(values_at(truth, solution, found)) - inner(values)
+        error = error if level else error - error.mean()
+        return float(np.mean(np.abs(error) <= _SIGMAS * inner(values_at(truth, solution, std))))
+
+    s = solution
+    return {
+        "T_within": within(s.temperature_k, s.temperature_std_k, truth.temperature_k),
+        "u_within": within(s.velocity_m_s, s.velocity_std_m_s, truth.velocity_m_s),
+        "p_within": within(s.pressure_m2_s2, s.pressure_std_m2_s2, truth.pressure_m2_s2, level=False),
+    }
 
 
 def values_at(truth: RoomVolume, solution: Solution, values: np.ndarray) -> np.ndarray:

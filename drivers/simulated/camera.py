@@ -29,7 +29,8 @@ class SimulatedCamera:
     """The twin of a V4L2 camera, behind the same Protocol.
 
     `shift_px` = (columns, rows) may be set between exposures: drift of the whole image, exact to a small
-    part of a pixel. Without a `clock` of the system's, time is simulated and no grab waits.
+    part of a pixel. `flicker` is the share (rms) by which the light changes from frame to frame. Without a `clock` of
+    the system's, time is simulated and no grab waits.
     """
 
     def __init__(
@@ -42,13 +43,14 @@ class SimulatedCamera:
         frame_rate_hz: float = 30.0,
         clock: Clock | None = None,
         faults: FaultScript = no_faults,
+        flicker: float = 0.0,
         name: str = "simulated camera",
     ) -> None:
         self.shift_px = (0.0, 0.0)
         self._view, self._seed, self._noise = view, seed, noise or SensorNoise()
         self._full_well_exposure_s = self._exposure_s = exposure_s
         self._gain, self._frame_rate_hz, self._name = 1.0, frame_rate_hz, name
-        self._clock, self._faults = clock or VirtualClock(), faults
+        self._clock, self._faults, self._flicker = clock or VirtualClock(), faults, flicker
         self._luminance = view()
         self._expected: tuple[object, ExpectedCounts] | None = None
         self._threads: ThreadPoolExecutor | None = None
@@ -189,8 +191,17 @@ class SimulatedCamera:
             factor = self._exposure_s / self._full_well_exposure_s
             self._expected = key, ExpectedCounts.of(moved, self._noise, factor, self._gain)
             self._luminance = luminance  # held, so that its id is not given to another array
+        brightness = self._brightness(index)
         if luminance.size < _THREADED_FROM_PX:
-            return self._expected[1].draw(self._seed, index)
+            return self._expected[1].draw(self._seed, index, brightness=brightness)
         if self._threads is None:
             self._threads = ThreadPoolExecutor(min(4, os.cpu_count() or 1), "simulated-camera")
-        return self._expected[1].draw(self._seed, index, self._threads)
+        return self._expected[1].draw(self._seed, index, self._threads, brightness)
+
+    def _brightness(self, index: int) -> float:
+        """The light of a frame; the same at every call."""
+        if self._flicker == 0.0:
+            return 1.0
+        return max(
+            0.0, 1.0 + self._flicker * float(np.random.default_rng([self._seed, index]).standard_normal())
+        )

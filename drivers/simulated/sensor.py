@@ -67,15 +67,22 @@ class ExpectedCounts:
         electrons += np.float32(noise.dark_counts)
         return cls(noise, k, electrons, std, blocks)
 
-    def draw(self, seed: int, sequence: int, executor: Executor | None = None) -> Pixels:
-        """Return one frame of counts; the same (seed, sequence) gives the same frame."""
+    def draw(
+        self, seed: int, sequence: int, executor: Executor | None = None, brightness: float = 1.0
+    ) -> Pixels:
+        """Return one frame of counts; the same arguments give the same frame.
+
+        `brightness` is that of the light in this frame; the noise is that of a brightness of 1.
+        """
         frame = np.empty(self.mean.shape, self.noise.dtype)
         each: Callable = executor.map if executor else map
-        for _ in each(lambda row: self._draw_block(frame, row, seed, sequence), _blocks(len(frame))):
+        for _ in each(
+            lambda row: self._draw_block(frame, row, seed, sequence, brightness), _blocks(len(frame))
+        ):
             pass
         return frame
 
-    def _draw_block(self, frame: np.ndarray, row: int, seed: int, sequence: int) -> None:
+    def _draw_block(self, frame: np.ndarray, row: int, seed: int, sequence: int, brightness: float) -> None:
         block = row // ROWS_PER_BLOCK
         random = np.random.Generator(np.random.SFC64([seed, sequence, block]))
         rows = slice(row, row + ROWS_PER_BLOCK)
@@ -86,6 +93,8 @@ class ExpectedCounts:
         counts += self.mean[rows]
         if dim is not None:
             counts.ravel()[few] = dim
+        if brightness != 1.0:
+            counts += np.float32(brightness - 1.0) * (self.mean[rows] - np.float32(self.noise.dark_counts))
         counts += np.float32(0.5)
         np.clip(counts, 0.0, self.noise.full_scale_counts + 0.5, out=counts)
         frame[rows] = counts

@@ -12,17 +12,13 @@ beside it.
 import argparse
 import json
 import time
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from app.bench.room_fit import coverage, problem_of
+from app.bench.room_fit import problem_of
 from app.reconstruct.problem import with_scene
-from app.volume.score import score_solution
+from app.volume.misread import misread
+from app.volume.score import coverage, score_solution
 from core.estimate.marches import Marches
-from core.problem import Problem
-from core.scene import BoundaryInformation, Heater, Inlet, Outlet, Wall
 from core.solve.room import RoomSettings, analyse, background_of
 
 
@@ -43,7 +39,7 @@ def main() -> None:
             for seed in options.seeds:
                 problem, volume = problem_of(path, information, "texture", "paper", seed)
                 if options.misread:
-                    problem, background = misread(problem, seed), None
+                    problem, background = with_scene(problem, misread(problem.scene, seed)), None
                 # Without misreadings the coarse room as stated, and its derivatives, serve all seeds.
                 background = background or background_of(problem, settings, Marches())
                 found = analyse(background, problem, settings, Marches())
@@ -58,28 +54,6 @@ def main() -> None:
                 row["cpu_s"] = time.process_time() - began_s
                 began_s = time.process_time()
                 print(json.dumps(row), flush=True)
-
-
-def misread(problem: Problem, seed: int) -> Problem:
-    """The problem with every stated temperature and supply off by a draw of its stated deviation."""
-    draw = np.random.default_rng(1000 + seed).standard_normal
-
-    def read(item: BoundaryInformation) -> BoundaryInformation:
-        if isinstance(item, Inlet):
-            speed_m_s = float(np.linalg.norm(item.velocity_m_s))
-            factor = 1.0 + item.velocity_std_m_s / speed_m_s * float(draw())
-            x, y, z = (factor * v for v in item.velocity_m_s)
-            warmer_k = item.temperature_std_k * float(draw())
-            return replace(item, temperature_k=item.temperature_k + warmer_k, velocity_m_s=(x, y, z))
-        if isinstance(item, Outlet) and item.mean_temperature_k is not None:
-            warmer_k = item.temperature_std_k * float(draw())
-            return replace(item, mean_temperature_k=item.mean_temperature_k + warmer_k)
-        if isinstance(item, Wall | Heater) and item.temperature_k is not None:
-            return replace(item, temperature_k=item.temperature_k + item.temperature_std_k * float(draw()))
-        return item
-
-    scene = replace(problem.scene, boundary=tuple(read(item) for item in problem.scene.boundary))
-    return with_scene(problem, scene)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,127 @@
+"""What a simulated camera sees: the experiment's room, rendered, on a mount that creeps."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float32
+
+from app.experiment.folder import Experiment
+from app.experiment.rig_settings import SimulatedCameraSettings
+from app.rig.nuisances import spoiled
+from app.volume.file import RoomVolume, read_volume
+from core.fields import GridField
+from core.geometry import Box, crop, rotation_matrix, rotation_vector
+from core.plan.print_choice import suited_print
+from core.render import render_flow, render_reference
+from core.scene import Scene
+
+# The print around a simulated room: as fine as the pattern, but another one.
+FRAME_SEED = 1_000_003
+
+AirState = Literal["still", "moving"]
+Picture = Float32[np.ndarray, "rows cols"]
+
+
+def seen_picture(
+    experiment: Experiment, settings: SimulatedCameraSettings, air: AirState, view: int, steps: int
+) -> Picture:
+    """The luminance of every pixel after so many steps of the mount; 1 fills the well. Raises BadInputError."""
+    scene = experiment.settings.scene
+    for step in range(steps):
+        scene = drifted(scene, view, settings.drift_px, settings.world.breathing_px, settings.seed + step)
+    picture = _rendered(experiment, settings, scene, air, view)
+    return spoiled(picture, settings.world, steps, settings.seed)
+
+
+def _rendered(
+    experiment: Experiment, settings: SimulatedCameraSettings, scene: Scene, air: AirState, view: int
+) -> Picture:
+    if air == "still":
+        image = render_reference(scene, view)
+    else:
+        volume = read_volume(experiment.file(settings.room))
+        image = render_flow(scene, volume_field(volume, scene), view)
+    return _framed(image, scene, view) if settings.border == "print" else image
+
+
+def _framed(image: Picture, scene: Scene, view: int) -> Picture:
+    """The picture in a printed frame: what lies beyond the wall is still, and shows the camera's drift."""
+    beyond = image == 0
+    room, reach_m = scene.room, 0.1 * max(scene.room.size_m)
+    (x0, y0, z0), (x1, y1, z1) = room.lower_m, room.upper_m
+    wide = Box(lower_m=(x0 - reach_m, y0, z0 - reach_m), upper_m=(x1 + reach_m, y1, z1 + reach_m))
+    camera = scene.views[view].camera
+    print_ = suited_print(camera, y1 - camera.position_m[1], FRAME_SEED)
+    frame_scene = replace(scene, room=wide, light=print_)
+    framed = image.copy()
+    for strip in _strips_around(~beyond):
+        part = replace(scene.views[view], camera=crop(camera, *strip))
+        views = tuple(part if i == view else v for i, v in enumerate(scene.views))
+        drawn = render_reference(replace(frame_scene, views=views), view)
+        framed[strip] = np.where(beyond[strip], drawn, image[strip])
+    return framed
+
+
+def _strips_around(inside: np.ndarray) -> list[tuple[slice, slice]]:
+    """The four strips (rows, columns) around the bounding box of what is inside."""
+    rows, cols = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return [(slice(0, inside.shape[0]), slice(0, inside.shape[1]))]
+    # One pixel more, for a box that is not quite upright in the picture.
+    top, bottom = int(rows[0]) + 2, int(rows[-1]) - 1
+    left, right = int(cols[0]) + 2, int(cols[-1]) - 1
+    strips = [
+        (slice(0, top), slice(0, inside.shape[1])),
+        (slice(bottom, inside.shape[0]), slice(0, inside.shape[1])),
+        (slice(top, bottom), slice(0, left)),
+        (slice(top, bottom), slice(right, inside.shape[1])),
+    ]
+    return [(r, c) for r, c in strips if r.stop > r.start and c.stop > c.start]
+
+
+def volume_field(volume: RoomVolume, scene: Scene) -> GridField:
+    """The volume's excess refractivity on evenly spaced vertices."""
+    excess_k = _evenly_spaced(volume).astype(np.float64) - scene.air.ambient_temperature_k
+    excess = -scene.air.ambient_refractivity * excess_k / (scene.air.ambient_temperature_k + excess_k)
+    room: Box = scene.room
+    return GridField(room.lower_m, room.upper_m, excess.astype(np.float32))
+
+
+def drifted(scene: Scene, view: int, drift_px: float, breathing_px: float, seed: int) -> Scene:
+    """The scene with one camera moved between exposures.
+
+    A shift of `drift_px`, a roll as large at the picture's edge, and a magnification of `breathing_px` there.
+    """
+    if drift_px == breathing_px == 0.0:
+        return scene
+    rng = np.random.default_rng([seed, 77])
+    camera = scene.views[view].camera
+    angle = rng.uniform(0, 2 * np.pi)
+    roll = rng.choice([-1.0, 1.0]) * drift_px / camera.width_px
+    grown = 1.0 + rng.choice([-1.0, 1.0]) * 2.0 * breathing_px / camera.width_px
+    column_px, row_px = drift_px * np.cos(angle), drift_px * np.sin(angle)
+    (cx, cy), (fx, fy) = camera.principal_px, camera.focal_px
+    rotation = rotation_matrix((0.0, 0.0, float(roll))) @ camera.rotation
+    moved = replace(
+        camera,
+        principal_px=(float(cx + column_px), float(cy + row_px)),
+        focal_px=(float(grown * fx), float(grown * fy)),
+        rotation_rad=rotation_vector(rotation),
+    )
+    views = tuple(replace(v, camera=moved) if n == view else v for n, v in enumerate(scene.views))
+    return replace(scene, views=views)
+
+
+def _evenly_spaced(volume: RoomVolume) -> Float32[np.ndarray, "nx ny nz"]:
+    """Temperature on evenly spaced vertices, at least as fine as the volume's own."""
+    temperature = volume.temperature_k
+    for index, axis in enumerate((volume.x_m, volume.y_m, volume.z_m)):
+        steps = np.diff(axis)
+        if steps.max() - steps.min() > 1e-4 * steps.max():
+            count = int(np.ceil((axis[-1] - axis[0]) / steps.min())) + 1
+            even = np.linspace(axis[0], axis[-1], min(count, 512))
+            temperature = np.apply_along_axis(
+                lambda line, even=even, axis=axis: np.interp(even, axis, line), index, temperature
+            )
+    return temperature.astype(np.float32)
