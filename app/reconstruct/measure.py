@@ -8,6 +8,7 @@ from scipy.ndimage import uniform_filter
 
 from app.errors import BadInputError
 from app.experiment.captures import Capture, CapturePair
+from app.reconstruct.cover import covered_windows
 from app.reconstruct.drift import Agreement, Exposures, agreement, mount, without_known_drift
 from core.camera_noise import frame_variance, scattered_variance
 from core.displacement import resolve_window_px, window_centres
@@ -84,7 +85,8 @@ def _measure_view(
         found = between_references(captures, scene, index)
         prior, said = found.at(_share(captures.reference, captures.flow, captures.after)), f"{found.said} "
     shift, drift, note = without_known_drift(exposures, in_room, beyond & _whole(centres, shape), prior)
-    return _in_room(shift, in_room, drift, said + note)
+    covered = covered_windows(scene, index, captures.reference.images[index].mean, window_px)
+    return _in_room(shift, in_room, covered, drift, said + note)
 
 
 def between_references(captures: CapturePair, scene: Scene, index: int = 0) -> Agreement:
@@ -115,10 +117,16 @@ def _share(*captures: Capture) -> float:
 
 
 def _in_room(
-    shift: ShiftMeasurement, in_room: np.ndarray, drift: Similarity, note: str
+    shift: ShiftMeasurement, in_room: np.ndarray, covered: np.ndarray, drift: Similarity, note: str
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     """The good windows that see the room's wall; what was refused is told."""
-    shift = shift.at(in_room)
+    hidden = covered[in_room]
+    if hidden.any():
+        note += (
+            f" Something stands before {100 * float(hidden.mean()):.1f} % of the wall: the reference does not show "
+            "the pattern there. These windows are left out."
+        )
+    shift = shift.at(in_room & ~covered)
     if shift.refused is not None and np.any(shift.refused):
         refused = float(shift.refused.mean())
         note += (

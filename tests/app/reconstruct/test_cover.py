@@ -1,0 +1,58 @@
+"""What stands before the wall is found in the reference, though it stands in both pictures."""
+
+import numpy as np
+import pytest
+
+from app.reconstruct.cover import covered_windows
+from app.rig.nuisances import covered, spoiled
+from app.simulate.worlds import LAB
+from app.volume.file import read_volume
+from app.volume.scene import RigOptions, room_scene
+from core.rays.visibility import sees_wall
+from core.render import render_reference
+from tests.app.capture.test_series import ROOM
+
+WINDOW_PX = 16
+
+
+def seen(light, pattern_seed=0):
+    options = RigOptions(
+        camera_px=(1280, 960), stand_off_m=4.0, baseline_m=(1.0, 1.0), light=light, pattern_seed=pattern_seed
+    )
+    scene = room_scene(read_volume(ROOM), options, "operator")
+    return scene, render_reference(scene)
+
+
+def noisy(picture, share, seed=3):
+    world = LAB.world.model_copy(update={"covered": share})
+    noise = np.random.default_rng(seed).standard_normal(picture.shape)
+    return (spoiled(picture, world, 0, seed) + 1e-3 * noise).astype(np.float32), world
+
+
+@pytest.mark.parametrize("light", ["texture", "projector"])
+def test_a_tenth_of_the_wall_behind_things_is_found_in_a_labs_light(light):
+    scene, picture = seen(light)
+    shown, world = noisy(picture, 0.1)
+
+    found = covered_windows(scene, 0, shown, WINDOW_PX)
+
+    rows, columns = (n // WINDOW_PX for n in shown.shape)
+    behind = covered(shown.shape, world, (0,), 3).reshape(rows, WINDOW_PX, columns, WINDOW_PX).mean((1, 3))
+    centres = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2) * WINDOW_PX + 7.5
+    on_wall = sees_wall(scene, 0, centres, margin_px=float(WINDOW_PX))
+    whole, free = (behind.ravel() == 1.0) & on_wall, (behind.ravel() == 0.0) & on_wall
+    assert whole.sum() > 30
+    assert found[whole].mean() > 0.95
+    # Blocks that are covered in part are left out whole: two windows deep at this camera.
+    assert found[free].mean() < 0.08
+
+
+def test_nothing_is_said_to_stand_before_a_free_wall():
+    scene, picture = seen("texture")
+    assert covered_windows(scene, 0, noisy(picture, 0.0)[0], WINDOW_PX).mean() < 0.005
+
+
+def test_another_pattern_than_the_stated_one_is_no_cover():
+    scene, _ = seen("texture")
+    _, other = seen("texture", pattern_seed=5)
+    assert not covered_windows(scene, 0, noisy(other, 0.0)[0], WINDOW_PX).any()
