@@ -63,7 +63,10 @@ def changed(
             raise BadInputError(
                 f"{text!r} is no nuisance of a world; expected NAME=VALUE, one of {', '.join(own)}."
             )
-        own[name] = value
+        try:
+            own[name] = float(value)
+        except ValueError:
+            raise BadInputError(f"{text!r}: {value!r} is no number.") from None
     try:
         spoiling = World.model_validate(own)
     except ValidationError as error:

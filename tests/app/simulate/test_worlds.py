@@ -1,0 +1,86 @@
+"""Worlds of a simulated rig: by name, changed value by value, one nuisance at a time, and entered wrongly."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from app.cli import create_cli
+from app.errors import BadInputError
+from app.experiment.captures import newest_pair
+from app.experiment.folder import open_experiment
+from app.simulate.worlds import IDEAL, LAB, changed, one_by_one
+from app.volume.file import read_volume
+from app.volume.misread import misread
+from app.volume.scene import RigOptions, room_scene
+from core.scene import Inlet, Outlet
+from tests.app.capture.test_series import ROOM
+
+
+def test_one_nuisance_at_a_time_and_then_all():
+    worlds = one_by_one(LAB)
+    names = [name for name in LAB.world.model_fields_set if name in worlds]
+    assert len(names) == 9
+    for name in names:
+        spoiling = worlds[name].world.model_dump()
+        assert spoiling[name] == getattr(LAB.world, name)
+        assert sum(value != worlds["nothing"].world.model_dump()[key] for key, value in spoiling.items()) == 1
+    assert worlds["all"] == LAB
+    assert worlds["all, still border"].border == "print"
+    assert worlds["entries misread"].misreads
+
+
+def test_a_value_is_changed_by_its_name():
+    found = changed(LAB, ["blur_px=1.5", "covered=0"], drift_px=0.2, border="print", misreads=False)
+    assert (found.world.blur_px, found.world.covered, found.world.ripple) == (1.5, 0.0, LAB.world.ripple)
+    assert (found.drift_px, found.border, found.misreads) == (0.2, "print", False)
+    assert changed(IDEAL, []) == IDEAL
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("blurr_px=1", "no nuisance of a world; expected NAME=VALUE, one of blur_px"),
+        ("blur_px", "expected NAME=VALUE"),
+        ("blur_px=-1", "blur_px=-1.0: .*greater than or equal to 0"),
+        ("covered=much", "'much' is no number"),
+    ],
+)
+def test_a_nuisance_that_cannot_be_is_named(text, words):
+    with pytest.raises(BadInputError, match=words):
+        changed(IDEAL, [text])
+
+
+def test_entries_are_as_wrong_as_their_deviations_say():
+    scene = room_scene(read_volume(ROOM), RigOptions(camera_px=(64, 48)), "operator")
+    (inlet,) = (item for item in scene.boundary if isinstance(item, Inlet))
+    off = []
+    for seed in range(200):
+        read = misread(scene, seed)
+        (entered,) = (item for item in read.boundary if isinstance(item, Inlet))
+        (outlet,) = (item for item in read.boundary if isinstance(item, Outlet))
+        speed = np.linalg.norm(entered.velocity_m_s) - np.linalg.norm(inlet.velocity_m_s)
+        off.append([(entered.temperature_k - inlet.temperature_k) / 0.1, speed / inlet.velocity_std_m_s])
+        assert outlet.temperature_std_k == 0.1
+    # 200 draws: their deviation is known to 5 %; three sigma.
+    np.testing.assert_allclose(np.std(off, axis=0), 1.0, atol=0.15)
+    assert misread(scene, 3) == misread(scene, 3)
+
+
+def test_a_labs_world_is_simulated_captured_and_kept_in_the_experiment(tmp_path):
+    folder = tmp_path / "e"
+    arguments = ["simulate", str(folder), "--truth", str(ROOM), "--camera-px", "320x240", "--frames", "8"]
+    done = CliRunner().invoke(
+        create_cli(), [*arguments, "--rig", "lab", "--world", "lab", "--set", "blur_px=0.4"]
+    )
+    assert done.exit_code == 0, done.output
+
+    experiment = open_experiment(folder)
+    camera = experiment.settings.rig.camera
+    assert camera.world.blur_px == 0.4
+    assert camera.world.covered == LAB.world.covered
+    assert (camera.border, camera.drift_px) == ("bare", 0.3)
+    exact = room_scene(read_volume(ROOM), RigOptions(camera_px=(320, 240), stand_off_m=4.0), "operator")
+    assert experiment.settings.scene.boundary == misread(exact, 0).boundary
+    pair = newest_pair(experiment)
+    # Nothing is beyond the wall, and the corners of the wall are darker.
+    assert pair.reference.images[0].mean[0].mean() < 0.02
