@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from core.displacement import measure_shift, standard_deviation_px
+from core.displacement import measure_shift, standard_deviation_px, window_centres
 from core.drift import Similarity, fit_similarity, move_image
 from core.setting import SettingError
 from core.window_fit import derivative_filter
@@ -165,3 +165,8 @@ def test_windows_that_something_covers_are_refused_and_the_others_are_not(coveri
     assert found.refused is not None
     assert found.refused[share > 0.02].mean() >= 0.95
     assert found.refused[clear].mean() <= 0.02
+
+
+def test_a_windows_centre_is_the_mean_of_its_pixels_places():
+    # Windows of 4 px: pixels 0 to 3 and 4 to 7 along a row, 0 to 3 down; what is left over belongs to none.
+    np.testing.assert_array_equal(window_centres((5, 9), 4), [[1.5, 1.5], [5.5, 1.5]])
