@@ -35,27 +35,27 @@ REFERENCE = RoomSettings(cells=64, coarse_cells=40, restart_s=80.0, rounds=16, r
 
 
 def draft(problem: Problem, watch: Watch = Watch()) -> Solution:
-    """Temperature in at most some ten seconds."""
+    """Temperature alone, in seconds."""
     return solve_draft(problem, TemperatureSettings(), watch)
 
 
 def grid(problem: Problem, watch: Watch = Watch()) -> Solution:
-    """All losses on the grid; `scene.solve.grid` cells an axis, 32 by default."""
+    """The paper's method on a grid of cells instead of its network."""
     return solve_grid(problem, grid_settings(problem), watch)
 
 
 def paper(problem: Problem, watch: Watch = Watch()) -> Solution:
-    """The paper's recipe: AdaBelief, 80,000 iterations, batches of 8192, 5000 and 4096, 64 vertices."""
+    """The paper's method with its network: hours without a graphics card."""
     return solve_mlp(problem, paper_settings(problem), watch)
 
 
 def standard(problem: Problem, watch: Watch = Watch()) -> Solution:
-    """The room marched at 48^3, its boundary corrected by the images: minutes."""
+    """Temperature, pressure and velocity by a flow solver that the pictures correct: minutes."""
     return solve_room(problem, sized(STANDARD, problem.scene), watch)
 
 
 def reference(problem: Problem, watch: Watch = Watch()) -> Solution:
-    """The same at 64^3 and longer."""
+    """As standard, on a finer grid: takes longer."""
     return solve_room(problem, sized(REFERENCE, problem.scene), watch)
 
 
@@ -86,7 +86,7 @@ def solved(solve: Solve, problem: Problem, watch: Watch) -> Solution:
 
 
 def resolved(name: str, scene: Scene) -> str:
-    """`standard` where something that drives the air and all walls are stated, else `draft`.
+    """Standard where something that drives the air and all walls are stated, else draft.
 
     Any other name stays as it is.
     """
