@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from calibration.drift import measure_drift
+from calibration.drift import _after, measure_drift
 from calibration.errors import ImageError
 from calibration.registration import FiniteSimilarity, border_mask, register
 
@@ -100,3 +100,9 @@ def test_pictures_that_cannot_be_registered_are_refused():
         register(picture, picture, np.zeros((SIZE, SIZE), bool))
     with pytest.raises(ImageError, match="no texture"):
         register(np.ones((SIZE, SIZE)), np.ones((SIZE, SIZE)), border_mask((SIZE, SIZE), 64))
+
+
+def test_the_projectors_motion_after_the_cameras_is_the_total():
+    camera, total = similarity(12.0, -5.0, 3.0), similarity(4.0, 9.0, -2.0)
+    projector = _after(camera, total)
+    np.testing.assert_allclose(projector.matrix @ camera.matrix, total.matrix, atol=1e-9)

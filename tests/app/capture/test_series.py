@@ -1,5 +1,6 @@
 """Reference, flow, reference: the second reference tells what the mount did, and whether the air was still."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,10 @@ import app.simulate
 from app.capture.burst import take
 from app.capture.series import take_series
 from app.errors import BadInputError
-from app.experiment.captures import newest_pair
+from app.experiment.captures import Capture, newest_pair
 from app.experiment.folder import Experiment, open_experiment
 from app.experiment.rig_settings import SimulatedCameraSettings
-from app.reconstruct.measure import between_references, measure
+from app.reconstruct.measure import _share, between_references, measure
 from app.reconstruct.problem import known_of
 from app.rig.open import air_of, open_camera
 from app.simulate.experiment import simulate
@@ -68,3 +69,13 @@ def test_a_newer_reference_ends_the_series(experiment):
     captures = newest_pair(experiment)
     assert captures.after is None
     assert captures.reference.folder == taken.folder
+
+
+def test_the_flow_lies_where_its_clock_says_between_the_references(experiment):
+    one = newest_pair(experiment).reference
+
+    def at(began_s: float) -> Capture:
+        return replace(one, manifest={**one.manifest, "origin": {"series": {"began_s": began_s}}})
+
+    assert _share(at(100.0), at(125.0), at(200.0)) == pytest.approx(0.25)
+    assert _share(at(100.0), at(100.0), at(100.0)) == 0.5
