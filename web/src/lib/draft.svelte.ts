@@ -59,7 +59,7 @@ class Draft {
   /** Opens what was typed before, or the answers of an experiment. */
   async open(experiment: string | null): Promise<void> {
     [this.past, this.future, this.last] = [[], [], ""];
-    this.experiment = experiment;
+    [this.answers, this.check, this.experiment] = [{}, null, experiment];
     if (experiment) {
       const found = await ask("GET /experiments/{experiment}/answers", { experiment });
       [this.answers, this.revision] = [found.answers, found.revision];
