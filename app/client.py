@@ -16,6 +16,7 @@ from jaxtyping import Float
 from pydantic import TypeAdapter
 
 from app.api.models.about import About, Health
+from app.api.models.answers import AnswersResource, CheckResource, FoundCamera, TemplateResource
 from app.api.models.calibrations import CalibrationResource
 from app.api.models.captures import CaptureResource, DeskResource, Role
 from app.api.models.devices import CameraResource
@@ -185,6 +186,35 @@ class Client:
             "boundary": boundary,
         }
         return self._ask(ExperimentResource, "POST", "/experiments", body)
+
+    def found_cameras(self) -> list[FoundCamera]:
+        """List the cameras that a new experiment may choose from."""
+        return self._ask(list[FoundCamera], "GET", "/devices/found")
+
+    def templates(self) -> list[TemplateResource]:
+        """List filled-in answers to start from."""
+        return self._ask(list[TemplateResource], "GET", "/answers/templates")
+
+    def check_answers(self, answers: Mapping[str, Any], experiment: str | None = None) -> CheckResource:
+        """Return every mistake in answers; where there is none, what they make."""
+        body = {"answers": dict(answers), "experiment": experiment}
+        return self._ask(CheckResource, "POST", "/answers/check", body)
+
+    def create_from_answers(self, answers: Mapping[str, Any]) -> ExperimentResource:
+        """Make an experiment for a rig and a room."""
+        body = {"answers": dict(answers)}
+        return self._ask(ExperimentResource, "POST", "/experiments/from-answers", body)
+
+    def answers(self, experiment: str) -> AnswersResource:
+        """Return the answers that an experiment was made from."""
+        return self._ask(AnswersResource, "GET", f"/experiments/{experiment}/answers")
+
+    def change_answers(
+        self, experiment: str, answers: Mapping[str, Any], revision: str | None = None
+    ) -> ExperimentResource:
+        """Change an experiment's answers; captures and results stay."""
+        path, body = f"/experiments/{experiment}/answers", {"answers": dict(answers)}
+        return self._ask(ExperimentResource, "PUT", path, body, revision=revision)
 
     def calibration(self, experiment: str) -> CalibrationResource:
         """Return the calibration in use."""

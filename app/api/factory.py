@@ -10,6 +10,7 @@ from app.api.page import add_page
 from app.api.resources import (
     about,
     addresses,
+    answers,
     calibrations,
     captures,
     devices,
@@ -42,6 +43,7 @@ RESOURCES: tuple[APIRouter, ...] = (
     shift.router,
     experiments.router,
     addresses.router,
+    answers.router,
     calibrations.router,
     guide.router,
     captures.router,

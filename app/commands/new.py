@@ -20,7 +20,7 @@ def new(
     template: Annotated[
         str,
         typer.Option(
-            help="Print answers to fill in: wall-jet, displacement, radiator, chilled-ceiling or empty."
+            help="Print answers to fill in: wall-jet, displacement, radiator, chilled-ceiling, empty or sample."
         ),
     ] = "",
 ) -> None:

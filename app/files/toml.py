@@ -39,12 +39,16 @@ def read_toml(path: Path, kind: type[T]) -> T:
 
 def from_toml(text: str, kind: type[T], source: str) -> T:
     """Parse TOML text into `kind`. Raises BadInputError that names every wrong key or value."""
+    return parse(toml_data(text, source), kind, source, text)
+
+
+def toml_data(text: str, source: str) -> dict[str, Any]:
+    """Plain data of a TOML text. Raises BadInputError with line and column."""
     with reading(source, "Correct the file at that place."):
         try:
-            data = tomllib.loads(text)
+            return tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise BadInputError(_no_toml(str(error), source)) from None
-        return parse(data, kind, source, text)
 
 
 def parse(data: dict[str, Any], kind: type[T], source: str, text: str = "") -> T:

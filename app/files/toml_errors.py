@@ -21,6 +21,25 @@ def explained(
     error: ValidationError, data: Any, kind: Any, source: str, places: Mapping[Path, Place] | None = None
 ) -> str:
     """Every mistake in the order of the file, each at its place. `places` is empty where there is no text."""
+    return in_file(said_of(error, data, kind), data, source, places or {}) or f"{source}: {error}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Said:
+    """A mistake: the path of its field, what is wrong there, and whether the field's key is unknown."""
+
+    path: Path
+    message: str
+    unknown: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """The message, which names the key where it is unknown."""
+        return f"unknown key {str(self.path[-1])!r}{self.message}" if self.unknown else self.message
+
+
+def said_of(error: ValidationError, data: Any, kind: Any) -> list[Said]:
+    """Every mistake that a validator found in `data`, once each."""
     wrong = _wrong_kinds(data, kind, ())
     mistyped = _mistyped(error, data, kind)
     told: dict[tuple[Path, bool], list[str]] = {}
@@ -32,14 +51,19 @@ def explained(
         elif path not in mistyped and _concerns(one["loc"], data, kind):
             said = told.setdefault((path, one["type"] in _UNKNOWN), [])
             said += [message for message in [_message(one, kind)] if message not in said]
+    return [Said(path, " or ".join(said), unknown) for (path, unknown), said in told.items()]
+
+
+def in_file(said: Sequence[Said], data: Any, source: str, places: Mapping[Path, Place]) -> str:
+    """Mistakes in the order of the file, each at its line and column; empty for none."""
     sentences = [
         (
-            _place(path, " or ".join(said), unknown, data, places or {}),
-            _sentence(path, " or ".join(said), unknown),
+            _place(one.path, one.message, one.unknown, data, places),
+            _sentence(one.path, one.message, one.unknown),
         )
-        for (path, unknown), said in told.items()
+        for one in said
     ]
-    return _joined(source, sorted(sentences, key=lambda one: one[0] or (0, 0))) or f"{source}: {error}"
+    return _joined(source, sorted(sentences, key=lambda one: one[0] or (0, 0)))
 
 
 def _mistyped(error: ValidationError, data: Any, kind: Any) -> set[Path]:

@@ -13,6 +13,8 @@ from app.files.toml import Strict
 from app.setup.units import Angle, Difference, Distance, Flow, Length, Share, Size, Speed, Temperature, Time
 from core.geometry import WallName
 
+# At most so many things of one kind are in a room.
+MANY = 100
 Pixels = Annotated[int, Field(ge=16, le=20_000)]
 
 
@@ -20,7 +22,8 @@ class CameraAnswer(Strict):
     """The camera, its lens, and where it stands: `distance` from the patterned wall, else `position`.
 
     The lens is known by its angle of view across the picture, or by focal length and pixel pitch. It is what
-    calibration starts from. A simulated camera looks at the room of `truth`, an NPZ file.
+    calibration starts from. A simulated camera looks at the room of `truth`: an NPZ file, or the
+    packaged room, `sample`.
     """
 
     kind: Literal["v4l2", "simulated"]
@@ -50,7 +53,7 @@ class CameraAnswer(Strict):
     position: tuple[Length, Length, Length] | None = None
     """The lens, from the room's corner: x, y, z."""
     truth: str = ""
-    """For a simulated camera: the room that it looks at (NPZ)."""
+    """For a simulated camera: the room that it looks at (NPZ), or `sample`."""
 
     @model_validator(mode="after")
     def _one_way(self) -> "CameraAnswer":
@@ -187,15 +190,15 @@ class Answers(Strict):
     """A projector instead of a print."""
     pattern_seed: int = 0
     """Which of all random patterns."""
-    supply: tuple[SupplyAnswer, ...] = ()
+    supply: tuple[SupplyAnswer, ...] = Field(default=(), max_length=MANY)
     """Where air is blown in."""
-    outlet: tuple[OutletAnswer, ...] = ()
+    outlet: tuple[OutletAnswer, ...] = Field(default=(), max_length=MANY)
     """Where air leaves."""
-    surface: tuple[SurfaceAnswer, ...] = ()
+    surface: tuple[SurfaceAnswer, ...] = Field(default=(), max_length=MANY)
     """Warm and cold surfaces."""
-    wall: tuple[WallAnswer, ...] = ()
+    wall: tuple[WallAnswer, ...] = Field(default=(), max_length=MANY)
     """Walls of which something is known."""
-    thermometer: tuple[ThermometerAnswer, ...] = ()
+    thermometer: tuple[ThermometerAnswer, ...] = Field(default=(), max_length=MANY)
     """Thermometers in the air."""
-    anemometer: tuple[AnemometerAnswer, ...] = ()
+    anemometer: tuple[AnemometerAnswer, ...] = Field(default=(), max_length=MANY)
     """Anemometers in the air."""

@@ -1,22 +1,35 @@
-"""An experiment's folder from answers: it appears whole or not at all."""
+"""An experiment's folder from answers: it appears whole or not at all, and its answers can be changed."""
 
-import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from app.errors import BadInputError
-from app.experiment.folder import Experiment, create_experiment, open_experiment
+from app.experiment.folder import (
+    Experiment,
+    ExperimentSettings,
+    create_experiment,
+    new_folder,
+    open_experiment,
+    save_settings,
+)
 from app.files.durable import durable_folder, write_durably, write_text
-from app.files.toml import from_toml
-from app.files.toml_errors import at_place
-from app.files.toml_places import nearest, places_of
+from app.files.reading import reading
+from app.files.toml import parse, toml_data
+from app.files.toml_errors import in_file
+from app.files.toml_places import places_of
 from app.setup.answers import Answers
+from app.setup.mistakes import mistakes_in
 from app.setup.scene import SENSORS_FILE, TRUTH_FILE, sensor_table, settings_of
 from app.volume.file import read_volume
+from app.volume.sample import SAMPLE_ROOM
 from app.volume.scene import room_box
+from core.geometry import Vector3
 
 ANSWERS_FILE = "answers.toml"
-TEMPLATES = ("wall-jet", "displacement", "radiator", "chilled-ceiling", "empty")
+# What `truth` names the packaged room by.
+SAMPLE = "sample"
+TEMPLATES = ("wall-jet", "displacement", "radiator", "chilled-ceiling", "empty", "sample")
 
 
 def template(name: str) -> str:
@@ -26,32 +39,100 @@ def template(name: str) -> str:
     return (Path(__file__).parent / "templates" / f"{name}.toml").read_text(encoding="utf-8")
 
 
+def read_answers(text: str, source: str) -> Answers:
+    """The answers in a TOML text. Raises BadInputError that tells every mistake with its line and column."""
+    data = toml_data(text, source)
+    wrong = mistakes_in(data)
+    if wrong:
+        raise BadInputError(in_file(wrong, data, source, places_of(text)))
+    return parse(data, Answers, source, text)
+
+
 def new_experiment(folder: Path, text: str, source: str) -> Experiment:
     """Make the experiment that the answers (TOML) describe; they are kept in it. Raises BadInputError."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise BadInputError(f"{folder} is not empty; give a new folder for the experiment.")
-    answers = from_toml(text, Answers, source)
-    truth = Path(answers.camera.truth) if answers.camera.truth else None
-    # A simulated room keeps its own coordinates: its corner is where they have it.
-    corner_m = (0.0, 0.0, 0.0) if truth is None else room_box(read_volume(truth)).lower_m
-    try:
-        settings = settings_of(answers, corner_m)
-    except BadInputError as error:
-        raise BadInputError(_placed(str(error), text, source)) from error
+    answers = read_answers(text, source)
     with durable_folder(folder) as unfinished:
-        create_experiment(unfinished, settings)
-        write_text(unfinished / ANSWERS_FILE, text)
-        sensors = sensor_table(answers, corner_m)
-        if sensors:
-            write_text(unfinished / SENSORS_FILE, sensors)
-        if truth is not None:
-            write_durably(unfinished / TRUTH_FILE, lambda temporary: shutil.copyfile(truth, temporary))
+        _fill(unfinished, answers, text)
     return open_experiment(folder)
 
 
-def _placed(sentence: str, text: str, source: str) -> str:
-    """A sentence about an answer (`supply 2: ...`, `camera.position: ...`) with the line and column of it."""
-    named = re.match(r"([a-z_.]+)(?: (\d+))?: ", sentence)
-    path = [*named[1].split("."), *([int(named[2]) - 1] if named[2] else [])] if named else []
-    found = nearest(places_of(text), tuple(path))
-    return f"{at_place(source, found[1].key)}: {sentence}" if found else sentence
+def add_experiment(parent: Path, text: str) -> Experiment:
+    """The same in a folder with a fresh name in `parent`. Raises BadInputError."""
+    answers = read_answers(text, ANSWERS_FILE)
+    return open_experiment(new_folder(parent, "room", lambda folder: _fill(folder, answers, text)))
+
+
+def answers_text(experiment: Experiment) -> str:
+    """The answers that an experiment was made from. Raises BadInputError where it was made without."""
+    path = experiment.folder / ANSWERS_FILE
+    if not path.is_file():
+        raise BadInputError(
+            f"{experiment.folder.name} was not made from answers. Change its experiment.toml, or make a new one."
+        )
+    with reading(path, "Correct the file."):
+        return path.read_text(encoding="utf-8")
+
+
+def change_answers(experiment: Experiment, text: str) -> Experiment:
+    """Give an experiment other answers; who calls holds its lock. Raises BadInputError.
+
+    What hangs on the wall stays as it is while camera, projector and pattern are answered as before: a print is
+    not made anew because a radiator was moved. The board, the notes and what was taken and computed stay too.
+    """
+    before, after = read_answers(answers_text(experiment), ANSWERS_FILE), read_answers(text, ANSWERS_FILE)
+    if before.camera.truth != after.camera.truth:
+        raise BadInputError(
+            "camera.truth: the room that a simulated camera looks at cannot be changed. Make a new experiment."
+        )
+    # The room's own copy: a path in a folder from elsewhere is not followed.
+    corner_m = corner_of(experiment.folder / TRUTH_FILE if after.camera.truth else None)
+    settings = _merged(experiment.settings, settings_of(after, corner_m), before, after)
+    _write_sensors(experiment.folder, after, corner_m)
+    write_text(experiment.folder / ANSWERS_FILE, text)
+    return save_settings(experiment.folder, settings)
+
+
+def _merged(
+    old: ExperimentSettings, new: ExperimentSettings, before: Answers, after: Answers
+) -> ExperimentSettings:
+    same = (before.camera, before.projector, before.pattern_seed) == (
+        after.camera,
+        after.projector,
+        after.pattern_seed,
+    )
+    scene = replace(new.scene, light=old.scene.light) if same else new.scene
+    rig = old.rig if same else new.rig.model_copy(update={"board": old.rig.board})
+    return new.model_copy(update={"information": old.information, "rig": rig, "scene": scene})
+
+
+def _fill(folder: Path, answers: Answers, text: str) -> None:
+    truth = truth_file(answers)
+    corner_m = corner_of(truth)
+    create_experiment(folder, settings_of(answers, corner_m))
+    write_text(folder / ANSWERS_FILE, text)
+    _write_sensors(folder, answers, corner_m)
+    if truth is not None:
+        write_durably(folder / TRUTH_FILE, lambda temporary: shutil.copyfile(truth, temporary))
+
+
+def truth_file(answers: Answers) -> Path | None:
+    """The room that a simulated camera looks at."""
+    named = answers.camera.truth
+    if not named:
+        return None
+    return SAMPLE_ROOM if named == SAMPLE else Path(named)
+
+
+def corner_of(truth: Path | None) -> Vector3:
+    """A simulated room keeps its own coordinates: its corner is where they have it. Raises BadInputError."""
+    return (0.0, 0.0, 0.0) if truth is None else room_box(read_volume(truth)).lower_m
+
+
+def _write_sensors(folder: Path, answers: Answers, corner_m: Vector3) -> None:
+    sensors = sensor_table(answers, corner_m)
+    if sensors:
+        write_text(folder / SENSORS_FILE, sensors)
+    else:
+        (folder / SENSORS_FILE).unlink(missing_ok=True)

@@ -11,10 +11,10 @@ from app.experiment.rig_settings import (
     V4l2CameraSettings,
 )
 from app.setup.answers import Answers, CameraAnswer, Opening, SupplyAnswer
+from app.setup.mistakes import contradictions, field_name
 from app.volume.scene import projected
 from core.air import Air
 from core.geometry import WALLS, Box, Optics, Vector3, face_of, looking_along_y
-from core.known import refuse_overlaps
 from core.plan.print_choice import suited_print
 from core.scene import (
     BoundaryInformation,
@@ -40,6 +40,9 @@ def settings_of(answers: Answers, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> Experi
 
     Raises BadInputError: an opening off its wall, two in one place, trapped air.
     """
+    wrong = contradictions(answers)
+    if wrong:
+        raise BadInputError("; ".join(f"{field_name(one.path)}: {one.message}" for one in wrong))
     room = Box(lower_m=corner_m, upper_m=_moved(answers.room, corner_m))
     try:
         optics = _optics(answers.camera, room)
@@ -89,12 +92,6 @@ def _optics(camera: CameraAnswer, room: Box) -> Optics:
         position = (room.centre_m[0], back_m - (camera.distance or 0.0), room.centre_m[2])
     else:
         position = _moved(camera.position, room.lower_m)
-    if position[1] >= back_m:
-        raise BadInputError(
-            f"camera.position: y is {position[1] - room.lower_m[1]:g} m, at or behind the patterned wall at "
-            f"y = {room.size_m[1]:g} m. "
-            "The camera stands before it: give a smaller y (below 0 is before the room)."
-        )
     return _straight(position, camera.width_px, camera.height_px, _focal_px(camera))
 
 
@@ -145,39 +142,28 @@ def _rig(answers: Answers) -> RigSettings:
 
 
 def _boundary(answers: Answers, room: Box) -> list[BoundaryInformation]:
-    inlets = [_inlet(item, room, f"supply {n}") for n, item in enumerate(answers.supply, 1)]
+    inlets = [_inlet(item, room) for item in answers.supply]
     outlets = [
         Outlet(
-            patch=_patch(item, room, f"outlet {n}"),
+            patch=_patch(item, room),
             mean_temperature_k=item.temperature,
             temperature_std_k=item.temperature_deviation,
         )
-        for n, item in enumerate(answers.outlet, 1)
+        for item in answers.outlet
     ]
     heaters = [
         Heater(
-            patch=_patch(item, room, f"surface {n}"),
+            patch=_patch(item, room),
             temperature_k=item.temperature,
             temperature_std_k=item.temperature_deviation,
         )
-        for n, item in enumerate(answers.surface, 1)
+        for item in answers.surface
     ]
-    if bool(inlets) != bool(outlets):
-        raise BadInputError(
-            f"There are {len(inlets)} supplies and {len(outlets)} outlets: air that comes in must leave, and air "
-            "that leaves must come in. Give at least one of both ([[supply]], [[outlet]]), or none."
-        )
-    refuse_overlaps((*inlets, *outlets, *heaters))
     sensors = [PointSensors(file=SENSORS_FILE)] if answers.thermometer or answers.anemometer else []
-    _check_places(answers, room)
     return [*inlets, *outlets, *heaters, *_walls(answers), *sensors]
 
 
 def _walls(answers: Answers) -> list[Wall]:
-    names = [item.wall for item in answers.wall]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice:
-        raise BadInputError(f"Wall {twice} is answered twice. Say one thing about a wall.")
     told = {
         item.wall: Wall(
             wall=item.wall,
@@ -190,8 +176,8 @@ def _walls(answers: Answers) -> list[Wall]:
     return [told.get(name, Wall(wall=name)) for name in WALLS]
 
 
-def _inlet(item: SupplyAnswer, room: Box, name: str) -> Inlet:
-    patch = _patch(item, room, name)
+def _inlet(item: SupplyAnswer, room: Box) -> Inlet:
+    patch = _patch(item, room)
     face = face_of(item.wall)
     speed_m_s = (item.speed or 0.0) if item.flow is None else item.flow / patch.area_m2
     velocity = [0.0, 0.0, 0.0]
@@ -205,34 +191,12 @@ def _inlet(item: SupplyAnswer, room: Box, name: str) -> Inlet:
     )
 
 
-def _patch(item: Opening, room: Box, name: str) -> Patch:
-    """The rectangle, on its wall. Raises BadInputError."""
+def _patch(item: Opening, room: Box) -> Patch:
+    """The rectangle, on its wall."""
     along = face_of(item.wall).along
-    for axis, low, high in zip(along, item.lower, item.upper, strict=True):
-        letter, length_m = "xyz"[axis], room.size_m[axis]
-        if low >= high:
-            raise BadInputError(
-                f"{name}: lower is {low:g} m and upper {high:g} m along {letter}; lower is the smaller one."
-            )
-        if low < -1e-9 or high > length_m + 1e-9:
-            raise BadInputError(
-                f"{name}: {low:g} to {high:g} m along {letter} is not on {item.wall}, which is 0 to {length_m:g} m "
-                f"long there. A rectangle on {item.wall} is given along {'xyz'[along[0]]}, then {'xyz'[along[1]]}."
-            )
     first, second = (room.lower_m[axis] for axis in along)
     return Patch(
         wall=item.wall,
         lower_m=(item.lower[0] + first, item.lower[1] + second),
         upper_m=(item.upper[0] + first, item.upper[1] + second),
     )
-
-
-def _check_places(answers: Answers, room: Box) -> None:
-    named = [("thermometer", sensor.position) for sensor in answers.thermometer]
-    named += [("anemometer", meter.position) for meter in answers.anemometer]
-    for name, place in named:
-        if not all(0 <= value <= size for value, size in zip(place, room.size_m, strict=True)):
-            raise BadInputError(
-                "A {} stands at {:g}, {:g}, {:g} m, outside the room of {:g} x {:g} x {:g} m. "
-                "Places are measured from the room's corner.".format(name, *place, *room.size_m)
-            )

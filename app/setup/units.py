@@ -62,6 +62,12 @@ def to_si(text: Any, kind: str) -> float:
     return factor * number + offset
 
 
+def _looks_like_kelvin(text: str) -> bool:
+    """Whether a temperature in C has the number that a room has in kelvin."""
+    written = _WRITTEN.fullmatch(text)
+    return written is not None and (written[2] or "").endswith("C") and 250 <= float(written[1]) <= 330
+
+
 @dataclass(frozen=True)
 class Written:
     """A value that is written with its unit and lies in a range (SI, ends included)."""
@@ -74,6 +80,11 @@ class Written:
     def read(self, text: Any) -> float:
         """The SI value. Raises ValueError."""
         value = to_si(text, self.kind)
+        if self.kind == "temperature" and _looks_like_kelvin(text):
+            raise ValueError(
+                f"{text!r} looks like kelvin: write {value - 273.15:g} K for {value - 546.3:.4g} C. "
+                f"Something that is really so hot is written in kelvin: {value:g} K."
+            )
         if not self.low <= value <= self.high:
             raise ValueError(f"{text!r} is out of range. {self.advice}")
         return value

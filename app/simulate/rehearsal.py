@@ -18,13 +18,13 @@ from app.experiment.rig_settings import BoardSettings, ProjectorSettings, RigSet
 from app.files.durable import write_durably
 from app.simulate.experiment import TRUTH_FILE
 from app.volume.file import read_volume
+from app.volume.sample import SAMPLE_ROOM
 from app.volume.scene import Information, RigOptions, room_scene, write_plane
 from calibration.bundle import given_bundle
 from core.scene import PlaneField, ProjectedPattern
 
 # Fast enough to practise with; a real lamp takes longer, and its lamp guard is the real one.
 TWIN = ProjectorSettings(url="simulated:?warm_up_s=8&cool_down_s=6")
-SAMPLE_ROOM = Path(__file__).resolve().parent / "sample" / "room.npz"
 
 # Large, for it is shown some twenty metres away.
 _BOARD = BoardSettings(columns=9, rows=6, square_m=0.1)

@@ -46,6 +46,10 @@ def furnish(station: Station, planned: bool) -> None:
 
 def shoot(page: Page, folder: Path, name: str) -> None:
     """Every page, whole; sticky parts where they are at the top."""
+    page.goto(page.url.split("#")[0] + "#/new")
+    page.get_by_role("radio", name="Simulated camera").check()
+    expect(page.locator("button.next")).to_have_text("Create the experiment")
+    page.screenshot(path=str(folder / f"0-New-{name}.png"), full_page=True)
     for number, title in enumerate(PAGES, 1):
         page.locator("nav").get_by_role("button", name=title).click()
         expect(page.locator("main")).to_have_attribute("aria-label", title)

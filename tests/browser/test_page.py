@@ -2,10 +2,11 @@
 
 import gzip
 import json
+import re
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Page, expect
 
 from drivers.simulated import CameraFault, SimulatedCamera
 from tests.app.rig.test_live_camera import SCENE
@@ -27,6 +28,18 @@ def test_the_first_load_and_the_lazy_chunk_stay_small():
     assert packed_bytes("assets/volume-*.js") <= 320_000
 
 
+def go(page: Page, name: str) -> None:
+    """Open a page; a new experiment is begun with the simulated camera, so that the whole of it is there."""
+    if name == "New":
+        page.get_by_role("button", name="Rig", exact=True).first.click()
+        page.get_by_role("button", name="New experiment", exact=True).click()
+        page.get_by_role("radio", name=re.compile("Simulated camera")).check()
+        expect(page.locator("button.next")).to_have_text("Create the experiment")
+    else:
+        page.get_by_role("button", name=name, exact=True).first.click()
+    expect(page.locator("main")).to_have_attribute("aria-label", name)
+
+
 @pytest.mark.skipif(not AXE.is_file(), reason="axe-core is not installed; run `python web/hatch_build.py`")
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_axe_finds_nothing_on_any_page(station: Station, opens: Opens, theme: str):
@@ -36,9 +49,8 @@ def test_axe_finds_nothing_on_any_page(station: Station, opens: Opens, theme: st
     page.locator("button.next").click()
     expect(page.locator("button.next")).to_have_text("Calibrate")
     page.evaluate(AXE.read_text(encoding="utf-8"))
-    for name in PAGES:
-        page.get_by_role("button", name=name, exact=True).first.click()
-        expect(page.locator("main")).to_have_attribute("aria-label", name)
+    for name in [*PAGES, "New"]:
+        go(page, name)
         found = page.evaluate(
             "async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])"
         )
@@ -50,9 +62,8 @@ def test_every_page_fits_a_screen_of_1024_by_768(station: Station, opens: Opens)
     page = opens(station.address, viewport={"width": 1024, "height": 768}, color_scheme="dark").page
     page.locator("button.next").click()
     expect(page.locator("button.next")).to_have_text("Calibrate")
-    for name in PAGES:
-        page.get_by_role("button", name=name, exact=True).first.click()
-        expect(page.locator("main")).to_have_attribute("aria-label", name)
+    for name in [*PAGES, "New"]:
+        go(page, name)
         assert page.evaluate("document.documentElement.scrollWidth") <= 1024, name
         assert page.locator("header").bounding_box()["height"] < 120, name
         snapshot(page, f"1024-{name}")

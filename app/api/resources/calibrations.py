@@ -68,13 +68,13 @@ def _rig(bundle: Bundle, beyond_m: Vector3) -> list[StandingResource]:
             name=one.name,
             role="projector" if one is bundle.projector else "camera",
             position_m=list(one.optics.position_m),
-            corners_m=_corners(one.optics, point, normal),
+            corners_m=corners_on(one.optics, point, normal),
         )
         for one in (*bundle.cameras, *projector)
     ]
 
 
-def _corners(
+def corners_on(
     optics: Optics, point_m: Float[np.ndarray, "3"], normal: Float[np.ndarray, "3"]
 ) -> list[list[float]]:
     """Where the picture's corners meet a plane; distortion is left out, for it bends no picture of a rig."""

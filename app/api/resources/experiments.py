@@ -37,13 +37,13 @@ def create_experiment(given: Given, new: NewExperiment, response: Response) -> E
     """Make an experiment with a simulated rig, ready to be connected."""
     made = rehearse(given.folders.root, Rehearsal(new.title, new.camera_px, new.light, new.boundary))
     given.ledger.append_event("experiment", {"experiment": made.folder.name, "created": True})
-    return _resource(made, response)
+    return experiment_resource(made, response)
 
 
 @router.get("/experiments/{experiment}")
 def read_experiment(given: Given, experiment: Identifier, response: Response) -> ExperimentResource:
     """Return one experiment."""
-    return _resource(given.folders.open(experiment), response)
+    return experiment_resource(given.folders.open(experiment), response)
 
 
 @router.patch("/experiments/{experiment}")
@@ -63,7 +63,7 @@ def change_experiment(
         if board is not None:
             words["rig"] = found.settings.rig.model_copy(update={"board": board})
         saved = save_settings(found.folder, found.settings.model_copy(update=words))
-    return _resource(saved, response)
+    return experiment_resource(saved, response)
 
 
 def _changeable(experiment: Experiment) -> dict[str, Any]:
@@ -123,6 +123,7 @@ def _line(experiment: Experiment) -> ExperimentLine:
     )
 
 
-def _resource(experiment: Experiment, response: Response) -> ExperimentResource:
+def experiment_resource(experiment: Experiment, response: Response) -> ExperimentResource:
+    """An experiment as it is answered, with its revision in the header."""
     response.headers.update(etag(experiment.revision))
     return ExperimentResource(**_line(experiment).model_dump(), settings=to_plain(experiment.settings))

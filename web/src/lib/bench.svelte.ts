@@ -15,7 +15,9 @@ import type {
 } from "./schema";
 
 export const PAGES = ["Rig", "Calibrate", "Plan", "Capture", "Reconstruct", "Look"] as const;
-export type Page = (typeof PAGES)[number];
+/** Reached from Rig: answers for a new experiment, and those of the one that is open. */
+const ASIDE = ["New", "Room"] as const;
+export type Page = (typeof PAGES)[number] | (typeof ASIDE)[number];
 
 // So many pixels across see the packaged room's 9.7 K in single windows; 384 would take 7400 frames.
 const SIMULATED_PX = 1536;
@@ -54,6 +56,9 @@ class Bench {
   done = $state("");
   /** Grows with everything that is told of a guided calibration. */
   guided = $state(0);
+
+  /** The next step of a page that has its own. */
+  offered = $state.raw<Step | null>(null);
 
   private stream: EventSource | null = null;
   private pending = new Set<string>();
@@ -161,6 +166,7 @@ class Bench {
 
   /** Where the page is, as the part of its address after the #: page, experiment, and on Look the result. */
   get place(): string {
+    if (this.page === "New") return "#/new";
     const parts = [this.page.toLowerCase(), this.experiment, this.page === "Look" ? this.result : null];
     return `#/${parts.flatMap((part) => (part ? [encodeURIComponent(part)] : [])).join("/")}`;
   }
@@ -174,7 +180,7 @@ class Bench {
 
   private read(hash: string): void {
     const [page, experiment, result] = hash.replace(/^#\/?/, "").split("/").map(decodeURIComponent);
-    const found = PAGES.find((one) => one.toLowerCase() === page);
+    const found = [...PAGES, ...ASIDE].find((one) => one.toLowerCase() === page);
     if (!found) return;
     this.page = found;
     if (experiment) this.experiment = experiment;
@@ -282,6 +288,7 @@ class Bench {
     const has = (role: string) => this.finished.some((one) => one.role === role);
     const step = (label: string, page: Page, act: () => Promise<unknown>, busy = false) => ({ label, page, act, busy });
     const nothing = () => Promise.resolve();
+    if (this.offered?.page === this.page) return this.offered;
     if (!this.experiment) return step("Start a simulated rig", "Rig", () => this.createSimulated());
     const needsCamera = ["Rig", "Calibrate", "Capture"].includes(this.page);
     if (needsCamera && this.ownCamera?.state === "failed")

@@ -1,0 +1,83 @@
+"""Answers about a room as they were written, with units; what is wrong in them, and what they make."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from app.api.models.calibrations import StandingResource
+from app.api.models.strict import Named, Strict
+
+
+class TemplateResource(Strict):
+    """Filled-in answers to start from."""
+
+    template: str
+    title: str
+    answers: dict[str, Any]
+
+
+class FoundCamera(Strict):
+    """A camera to choose, with what it would be asked for; `error` says why it cannot be used."""
+
+    kind: Literal["v4l2", "simulated"]
+    device: str
+    name: str
+    pixel_format: str
+    bits: int
+    width_px: int
+    height_px: int
+    error: str = ""
+
+
+class SentAnswers(Strict):
+    """Answers, for a new experiment or for the one that is named."""
+
+    answers: dict[str, Any] = Field(max_length=100)
+    experiment: Named | None = None
+
+
+class NewAnswers(Strict):
+    """Answers as answers.toml holds them."""
+
+    answers: dict[str, Any] = Field(max_length=100)
+
+
+class MistakeResource(Strict):
+    """What is wrong at one field, such as `supply[0].flow`."""
+
+    field: str
+    sentence: str
+
+
+class SupplyTold(Strict):
+    """What a supply's answer means."""
+
+    field: str
+    speed_m_s: float
+    flow_m3_h: float
+
+
+class RoomTold(Strict):
+    """What the answers make: the picture on the patterned wall and the wall itself (width, height), the room's two
+    corners, the supplies, who stands where, and the settings in SI."""
+
+    picture_m: list[float]
+    wall_m: list[float]
+    room_m: list[list[float]]
+    supplies: list[SupplyTold]
+    standing: list[StandingResource]
+    settings: dict[str, Any]
+
+
+class CheckResource(Strict):
+    """Every mistake in answers; `told` where there is none."""
+
+    mistakes: list[MistakeResource]
+    told: RoomTold | None
+
+
+class AnswersResource(Strict):
+    """The answers of an experiment; `revision` goes into the `If-Match` of a change."""
+
+    answers: dict[str, Any]
+    revision: str

@@ -1,0 +1,166 @@
+"""Answers about a rig and its room: templates, their check while somebody types, experiments made from them."""
+
+from typing import Any, Literal
+
+import numpy as np
+from fastapi import APIRouter, Response
+
+from app.api.models.answers import (
+    AnswersResource,
+    CheckResource,
+    FoundCamera,
+    MistakeResource,
+    NewAnswers,
+    RoomTold,
+    SentAnswers,
+    SupplyTold,
+    TemplateResource,
+)
+from app.api.models.calibrations import StandingResource
+from app.api.models.experiments import ExperimentResource
+from app.api.resources.calibrations import corners_on
+from app.api.resources.experiments import experiment_resource
+from app.api.services import Given
+from app.api.wire.identifier import Identifier
+from app.api.wire.revision import IfMatch, check_revision, etag
+from app.errors import BadInputError
+from app.experiment.folder import Experiment, ExperimentSettings
+from app.files.toml import parse, to_plain, to_toml, toml_data
+from app.files.toml_errors import Said
+from app.rig.inventory import found_cameras
+from app.setup.answers import Answers
+from app.setup.experiment import (
+    ANSWERS_FILE,
+    SAMPLE,
+    TEMPLATES,
+    add_experiment,
+    answers_text,
+    change_answers,
+    corner_of,
+    template,
+    truth_file,
+)
+from app.setup.mistakes import field_name, mistakes_in
+from app.setup.scene import picture_on_wall_m, settings_of
+from core.geometry import Box, Optics
+from core.scene import Inlet, ProjectedPattern
+
+router = APIRouter(tags=["answers"])
+
+
+@router.get("/devices/found")
+def list_found_cameras(given: Given) -> list[FoundCamera]:
+    """List the cameras that are plugged in, and the simulated one."""
+    return [FoundCamera.of(one) for one in found_cameras()]
+
+
+@router.get("/answers/templates")
+def list_templates(given: Given) -> list[TemplateResource]:
+    """List filled-in answers to start from."""
+    read = {name: toml_data(template(name), name) for name in TEMPLATES}
+    return [TemplateResource(template=n, title=str(data["title"]), answers=data) for n, data in read.items()]
+
+
+@router.post("/answers/check")
+def check_answers(given: Given, sent: SentAnswers) -> CheckResource:
+    """Return every mistake at its field; where there is none, what the answers make."""
+    kept = None if sent.experiment is None else _kept(given.folders.open(sent.experiment))
+    wrong = _mistakes(sent.answers, kept)
+    if wrong:
+        lines = [MistakeResource(field=field_name(one.path), sentence=one.sentence) for one in wrong]
+        return CheckResource(mistakes=lines, told=None)
+    answers = parse(sent.answers, Answers, ANSWERS_FILE)
+    corner_m = (0.0, 0.0, 0.0) if answers.camera.truth not in ("", SAMPLE) else corner_of(truth_file(answers))
+    return CheckResource(mistakes=[], told=_told(settings_of(answers, corner_m)))
+
+
+@router.post("/experiments/from-answers", status_code=201)
+def create_from_answers(given: Given, new: NewAnswers, response: Response) -> ExperimentResource:
+    """Make an experiment for a rig and a room."""
+    _refuse(_mistakes(new.answers, None))
+    made = add_experiment(given.folders.root, to_toml(new.answers))
+    given.ledger.append_event("experiment", {"experiment": made.folder.name, "created": True})
+    return experiment_resource(made, response)
+
+
+@router.get("/experiments/{experiment}/answers")
+def read_answers(given: Given, experiment: Identifier, response: Response) -> AnswersResource:
+    """Return the answers that an experiment was made from."""
+    found = given.folders.open(experiment)
+    response.headers.update(etag(found.revision))
+    return AnswersResource(answers=_kept(found), revision=found.revision)
+
+
+@router.put("/experiments/{experiment}/answers")
+def put_answers(
+    given: Given, experiment: Identifier, new: NewAnswers, response: Response, if_match: IfMatch = None
+) -> ExperimentResource:
+    """Change an experiment's answers; captures and results stay, and a result keeps the room it was made with."""
+    with given.folders.locked(experiment):
+        found = given.folders.open(experiment)
+        kept = _kept(found)
+        check_revision(if_match, {"revision": found.revision, "answers": kept}, {"answers": new.answers})
+        _refuse(_mistakes(new.answers, kept))
+        changed = change_answers(found, to_toml(new.answers))
+    given.ledger.append_event("experiment", {"experiment": experiment, "changed": True})
+    return experiment_resource(changed, response)
+
+
+def _kept(experiment: Experiment) -> dict[str, Any]:
+    return toml_data(answers_text(experiment), ANSWERS_FILE)
+
+
+def _mistakes(data: dict[str, Any], kept: dict[str, Any] | None) -> list[Said]:
+    """Every mistake; a request names no file of this machine, but may leave what an experiment was made with."""
+    truth, before = _truth(data), _truth(kept or {})
+    wrong = mistakes_in(data)
+    if truth in (None, "", SAMPLE) if kept is None else truth == before:
+        return wrong
+    expected = (
+        f"expected {SAMPLE!r}, the packaged room" if kept is None else "it cannot be changed afterwards"
+    )
+    return [*wrong, Said(("camera", "truth"), f"{truth!r} is no room of this service; {expected}.")]
+
+
+def _truth(data: dict[str, Any]) -> Any:
+    camera = data.get("camera")
+    return camera.get("truth") if isinstance(camera, dict) else None
+
+
+def _refuse(wrong: list[Said]) -> None:
+    if wrong:
+        raise BadInputError("; ".join(f"{field_name(one.path)}: {one.sentence}" for one in wrong))
+
+
+def _told(settings: ExperimentSettings) -> RoomTold:
+    scene = settings.scene
+    light = scene.light
+    thrown = (light.projector,) if isinstance(light, ProjectedPattern) else ()
+    camera = scene.views[0].camera
+    return RoomTold(
+        picture_m=list(picture_on_wall_m(camera, scene.room)),
+        wall_m=[scene.room.size_m[0], scene.room.size_m[2]],
+        room_m=[list(scene.room.lower_m), list(scene.room.upper_m)],
+        supplies=[_supply(n, one) for n, one in enumerate(p for p in scene.boundary if isinstance(p, Inlet))],
+        standing=[
+            _standing("camera", camera, scene.room),
+            *(_standing("projector", t, scene.room) for t in thrown),
+        ],
+        settings=to_plain(settings),
+    )
+
+
+def _standing(role: Literal["camera", "projector"], optics: Optics, room: Box) -> StandingResource:
+    return StandingResource(
+        name=role,
+        role=role,
+        position_m=list(optics.position_m),
+        corners_m=corners_on(optics, np.array(room.upper_m), np.array((0.0, 1.0, 0.0))),
+    )
+
+
+def _supply(number: int, inlet: Inlet) -> SupplyTold:
+    speed_m_s = sum(part * part for part in inlet.velocity_m_s) ** 0.5
+    return SupplyTold(
+        field=f"supply[{number}]", speed_m_s=speed_m_s, flow_m3_h=3600 * speed_m_s * inlet.patch.area_m2
+    )

@@ -1,0 +1,47 @@
+"""The cameras that a new experiment may choose from: what is plugged in, and one that computes its pictures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from drivers.v4l2 import list_devices
+from drivers.v4l2.formats import FORMATS
+from drivers.v4l2.inventory import DeviceDescription
+
+
+@dataclass(frozen=True)
+class CameraChoice:
+    """A camera and what it would be asked for: its deepest grey format at its largest size."""
+
+    kind: Literal["v4l2", "simulated"]
+    device: str
+    name: str
+    pixel_format: str
+    bits: int
+    width_px: int
+    height_px: int
+    error: str = ""
+
+
+SIMULATED = CameraChoice("simulated", "", "Simulated camera in the packaged room", "", 12, 384, 288)
+
+
+def found_cameras(folder: Path = Path("/dev")) -> Sequence[CameraChoice]:
+    """Every camera of the kernel, then the simulated one."""
+    return [*map(_choice, list_devices(folder)), SIMULATED]
+
+
+def _choice(found: DeviceDescription) -> CameraChoice:
+    depths = {one.code: one.bits for one in FORMATS}
+    offered = [
+        (depths[one.code], size.width_px * size.height_px, one.code, size)
+        for one in found.formats
+        for size in one.sizes
+        if one.code in depths
+    ]
+    if not offered:
+        reason = found.error or "It has no format that airlens reads. Choose another camera."
+        return CameraChoice("v4l2", str(found.path), found.name, "", 0, 0, 0, reason)
+    bits, _, code, size = max(offered, key=lambda one: one[:2])
+    return CameraChoice("v4l2", str(found.path), found.name, code, bits, size.width_px, size.height_px)

@@ -1,0 +1,213 @@
+"""Every mistake in answers at its field: for a file (line and column) and for the service (the field's name).
+
+A part with a mistake of its own is left out of the comparisons with others, so that one slip is told once.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from itertools import combinations
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from app.files.toml_errors import Said, said_of
+from app.files.toml_places import Path
+from app.setup.answers import (
+    AnemometerAnswer,
+    Answers,
+    CameraAnswer,
+    Opening,
+    OutletAnswer,
+    ProjectorAnswer,
+    SupplyAnswer,
+    SurfaceAnswer,
+    ThermometerAnswer,
+    WallAnswer,
+)
+from app.setup.units import Size
+from core.geometry import Vector3, face_of
+
+# Faster than any supply of a room.
+FASTEST_M_S = 50.0
+_ONES: dict[str, Any] = {
+    "room": tuple[Size, Size, Size],
+    "camera": CameraAnswer,
+    "projector": ProjectorAnswer,
+}
+_LISTS: dict[str, Any] = {
+    "supply": SupplyAnswer,
+    "outlet": OutletAnswer,
+    "surface": SurfaceAnswer,
+    "wall": WallAnswer,
+    "thermometer": ThermometerAnswer,
+    "anemometer": AnemometerAnswer,
+}
+# Each sound part of the answers by its path: `("room",)`, `("supply", 0)`.
+Parts = Mapping[Path, Any]
+
+
+def mistakes_in(data: Mapping[str, Any]) -> list[Said]:
+    """Every mistake in answers as they were written; empty where they describe an experiment."""
+    try:
+        answers = TypeAdapter(Answers).validate_json(_json(data), strict=True)
+    except ValidationError as error:
+        # How many supplies and outlets there are can be told of those that are wrong too.
+        trapped = _trapped_air(*(_count(data.get(name)) for name in ("supply", "outlet")))
+        return [*said_of(error, data, Answers), *trapped, *_contradictions(_sound_parts(data))]
+    return contradictions(answers)
+
+
+def contradictions(answers: Answers) -> list[Said]:
+    """What cannot be true of sound answers together."""
+    return [*_trapped_air(len(answers.supply), len(answers.outlet)), *_contradictions(_parts_of(answers))]
+
+
+def _count(items: Any) -> int:
+    return len(items) if isinstance(items, list) else 0
+
+
+def _json(value: Any) -> str:
+    """A date, which TOML has and JSON has not, is told as a text that is no value."""
+    return json.dumps(value, default=str)
+
+
+def field_name(path: Path) -> str:
+    """A path as a person reads it: `supply[0].flow`."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
+
+
+def _parts_of(answers: Answers) -> Parts:
+    """The parts of sound answers."""
+    ones: dict[Path, Any] = {
+        (name,): getattr(answers, name) for name in _ONES if getattr(answers, name) is not None
+    }
+    lists: dict[Path, Any] = {
+        (name, n): item for name in _LISTS for n, item in enumerate(getattr(answers, name))
+    }
+    return ones | lists
+
+
+def _contradictions(parts: Parts) -> list[Said]:
+    checks: tuple[Callable[[Parts], Iterator[Said]], ...] = (
+        _off_its_wall,
+        _overlaps,
+        _too_fast,
+        _behind_the_wall,
+        _outside_the_room,
+        _wall_twice,
+    )
+    return [said for check in checks for said in check(parts)]
+
+
+def _sound_parts(data: Mapping[str, Any]) -> Parts:
+    written: dict[Path, tuple[Any, Any]] = {
+        (name,): (data[name], kind) for name, kind in _ONES.items() if name in data
+    }
+    for name, kind in _LISTS.items():
+        items = data.get(name)
+        written |= {(name, n): (v, kind) for n, v in enumerate(items if isinstance(items, list) else [])}
+    found: dict[Path, Any] = {}
+    for path, (value, kind) in written.items():
+        try:
+            found[path] = TypeAdapter(kind).validate_json(_json(value), strict=True)
+        except ValidationError:
+            continue
+    return found
+
+
+def _named(parts: Parts, *names: str) -> list[tuple[Path, Any]]:
+    return [(path, part) for path, part in parts.items() if path[0] in names]
+
+
+def _openings(parts: Parts) -> list[tuple[Path, Opening]]:
+    return _named(parts, "supply", "outlet", "surface")
+
+
+def _off_its_wall(parts: Parts) -> Iterator[Said]:
+    room_m: Vector3 | None = parts.get(("room",))
+    for path, item in _openings(parts):
+        along = face_of(item.wall).along
+        for number, axis in enumerate(along):
+            low_m, high_m, letter = item.lower[number], item.upper[number], "xyz"[axis]
+            if low_m >= high_m:
+                told = (
+                    f"lower is {low_m:g} m and upper {high_m:g} m along {letter}; lower is the smaller one."
+                )
+                yield Said((*path, "upper", number), told)
+            elif room_m and (low_m < -1e-9 or high_m > room_m[axis] + 1e-9):
+                yield Said(
+                    (*path, "lower" if low_m < -1e-9 else "upper", number),
+                    f"{low_m:g} to {high_m:g} m along {letter} is not on {item.wall}, which is 0 to "
+                    f"{room_m[axis]:g} m long there.{_millimetres(high_m, room_m[axis])} A rectangle on "
+                    f"{item.wall} is given along {'xyz'[along[0]]}, then {'xyz'[along[1]]}.",
+                )
+
+
+def _millimetres(value_m: float, length_m: float) -> str:
+    """A question, where a number is too large by a factor that only a wrong unit makes."""
+    return f" Are these millimetres ({value_m:g} mm)?" if value_m > 10 * length_m else ""
+
+
+def _overlaps(parts: Parts) -> Iterator[Said]:
+    for (path, one), (later, other) in combinations(_openings(parts), 2):
+        shared_m = [
+            min(h1, h2) - max(l1, l2)
+            for l1, h1, l2, h2 in zip(one.lower, one.upper, other.lower, other.upper, strict=True)
+        ]
+        if one.wall == other.wall and min(shared_m) > 1e-9:
+            yield Said(
+                later,
+                f"it overlaps {path[0]} {int(path[1]) + 1} on {one.wall}. A place on a wall is a supply, an "
+                "outlet or a surface: move one of them.",
+            )
+
+
+def _trapped_air(supplies: int, outlets: int) -> Iterator[Said]:
+    if bool(supplies) != bool(outlets):
+        yield Said(
+            ("supply",) if supplies else ("outlet",),
+            f"there are {supplies} supplies and {outlets} outlets: air that comes in must leave, and air "
+            "that leaves must come in. Give at least one of both (supply, outlet), or none.",
+        )
+
+
+def _too_fast(parts: Parts) -> Iterator[Said]:
+    for path, item in _named(parts, "supply"):
+        area_m2 = (item.upper[0] - item.lower[0]) * (item.upper[1] - item.lower[1])
+        if area_m2 > 0 and item.flow is not None and item.flow / area_m2 > FASTEST_M_S:
+            yield Said(
+                (*path, "flow"),
+                f"{3600 * item.flow:g} m3/h through {area_m2:g} m2 is {item.flow / area_m2:.3g} m/s; air comes into "
+                f"a room slower than {FASTEST_M_S:g} m/s. Are the unit and the size of the opening right?",
+            )
+
+
+def _behind_the_wall(parts: Parts) -> Iterator[Said]:
+    room_m: Vector3 | None = parts.get(("room",))
+    for path, item in _named(parts, "camera", "projector"):
+        if room_m and item.position is not None and item.position[1] >= room_m[1]:
+            yield Said(
+                (*path, "position", 1),
+                f"y is {item.position[1]:g} m, at or behind the patterned wall at y = {room_m[1]:g} m. "
+                f"The {path[0]} stands before it: give a smaller y (below 0 is before the room).",
+            )
+
+
+def _outside_the_room(parts: Parts) -> Iterator[Said]:
+    room_m: Vector3 | None = parts.get(("room",))
+    for path, item in _named(parts, "thermometer", "anemometer") if room_m else ():
+        for axis, (place_m, length_m) in enumerate(zip(item.position, room_m or (), strict=True)):
+            if not 0 <= place_m <= length_m:
+                yield Said(
+                    (*path, "position", axis),
+                    f"{place_m:g} m along {'xyz'[axis]} is outside the room, which is 0 to {length_m:g} m there."
+                    f"{_millimetres(place_m, length_m)} Places are measured from the room's corner.",
+                )
+
+
+def _wall_twice(parts: Parts) -> Iterator[Said]:
+    seen: set[str] = set()
+    for path, item in _named(parts, "wall"):
+        if item.wall in seen:
+            yield Said((*path, "wall"), f"{item.wall} is answered twice. Say one thing about a wall.")
+        seen.add(item.wall)

@@ -1,0 +1,149 @@
+// Answers about a rig and its room while they are typed: every change can be undone, is kept in the browser until
+// the experiment is made, and is checked by the service.
+import { ask, ProblemError } from "./api";
+import { bench } from "./bench.svelte";
+import type { CheckResource } from "./schema";
+
+export type Path = (string | number)[];
+export type Tree = Record<string, unknown>;
+export const KINDS = ["supply", "outlet", "surface", "wall", "thermometer", "anemometer"] as const;
+export type Kind = (typeof KINDS)[number];
+
+const KEPT = "answers";
+const REST_MS = 250;
+const LENGTHS: Record<string, number> = { m: 1, cm: 0.01, mm: 0.001, ft: 0.3048, in: 0.0254 };
+
+/** The metres of "45 cm"; null where it is no length. */
+export function metres(text: unknown): number | null {
+  const found = /^\s*([-+]?[\d.]+(?:e[-+]?\d+)?)\s*(\w+)\s*$/i.exec(String(text));
+  const [value, factor] = [Number(found?.[1]), LENGTHS[found?.[2] ?? ""]];
+  return factor === undefined || !Number.isFinite(value) ? null : value * factor;
+}
+
+export const written = (value_m: number) => `${Number(value_m.toFixed(3))} m`;
+
+/** `supply[0].flow` */
+export const fieldName = (path: Path) =>
+  path
+    .map((part) => (typeof part === "number" ? `[${part}]` : `.${part}`))
+    .join("")
+    .replace(/^\./, "");
+
+function at(tree: unknown, path: Path): unknown {
+  return path.reduce<unknown>((inner, part) => (inner as Tree | undefined)?.[part], tree);
+}
+
+class Draft {
+  answers = $state.raw<Tree>({});
+  check = $state.raw<CheckResource | null>(null);
+  /** The experiment whose room is edited; null for a new one. */
+  experiment = $state<string | null>(null);
+  revision = $state("");
+  past = $state.raw<Tree[]>([]);
+  future = $state.raw<Tree[]>([]);
+  private last = "";
+  private timer: ReturnType<typeof setTimeout> | undefined;
+  private asked = 0;
+
+  mistakes = $derived(new Map((this.check?.mistakes ?? []).map((one) => [one.field, one.sentence])));
+
+  value(path: Path): unknown {
+    return at(this.answers, path);
+  }
+
+  items(kind: Kind): Tree[] {
+    const found = this.answers[kind];
+    return Array.isArray(found) ? (found as Tree[]) : [];
+  }
+
+  /** Opens what was typed before, or the answers of an experiment. */
+  async open(experiment: string | null): Promise<void> {
+    [this.past, this.future, this.last] = [[], [], ""];
+    [this.answers, this.check, this.experiment] = [{}, null, experiment];
+    if (experiment) {
+      const found = await ask("GET /experiments/{experiment}/answers", { experiment });
+      [this.answers, this.revision] = [found.answers, found.revision];
+    } else this.answers = JSON.parse(localStorage.getItem(KEPT) ?? "{}") as Tree;
+    this.later();
+  }
+
+  /** Sets one field; undefined removes it. Typing in one field is undone at once. */
+  set(path: Path, value: unknown): void {
+    const next = JSON.parse(JSON.stringify(this.answers)) as Tree;
+    const parent = at(next, path.slice(0, -1)) as Tree | undefined;
+    const key = path.at(-1);
+    if (!parent || key === undefined) return;
+    if (value !== undefined) parent[key] = value;
+    else if (Array.isArray(parent)) parent.splice(Number(key), 1);
+    else delete parent[key];
+    this.put(next, fieldName(path));
+  }
+
+  add(kind: Kind, item: Tree): void {
+    this.put({ ...this.answers, [kind]: [...this.items(kind), item] }, "");
+  }
+
+  /** Replaces all answers; `name` joins changes of one field. */
+  put(next: Tree, name = ""): void {
+    if (!name || name !== this.last) this.past = [...this.past.slice(-199), this.answers];
+    [this.answers, this.future, this.last] = [next, [], name];
+    this.later();
+  }
+
+  undo(): void {
+    const before = this.past.at(-1);
+    if (!before) return;
+    [this.future, this.past] = [[...this.future, this.answers], this.past.slice(0, -1)];
+    [this.answers, this.last] = [before, ""];
+    this.later();
+  }
+
+  redo(): void {
+    const after = this.future.at(-1);
+    if (!after) return;
+    [this.past, this.future] = [[...this.past, this.answers], this.future.slice(0, -1)];
+    [this.answers, this.last] = [after, ""];
+    this.later();
+  }
+
+  private later(): void {
+    if (!this.experiment) localStorage.setItem(KEPT, JSON.stringify(this.answers));
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => void this.ask(), REST_MS);
+  }
+
+  private async ask(): Promise<void> {
+    const number = ++this.asked;
+    try {
+      const body = { answers: this.answers, experiment: this.experiment };
+      const found = await ask("POST /answers/check", {}, body);
+      // Only the newest question's answer counts.
+      if (number === this.asked) this.check = found;
+    } catch (error) {
+      if (!(error instanceof ProblemError)) throw error;
+      bench.problem = error.problem;
+    }
+  }
+
+  /** Makes the experiment, or changes it, and goes on to its rig. */
+  async send(): Promise<void> {
+    if (this.experiment) {
+      const there = { experiment: this.experiment };
+      await bench.change("Changing the room", this.revision, async (revision) => {
+        const body = { answers: this.answers };
+        const made = await ask("PUT /experiments/{experiment}/answers", there, body, revision);
+        this.revision = made.revision;
+        bench.page = bench.result ? "Look" : "Rig";
+      });
+    } else {
+      const made = await ask("POST /experiments/from-answers", {}, { answers: this.answers });
+      localStorage.removeItem(KEPT);
+      [bench.experiment, bench.page] = [made.experiment, "Rig"];
+      await bench.refresh();
+      await bench.connect();
+    }
+    await bench.refresh();
+  }
+}
+
+export const draft = new Draft();
