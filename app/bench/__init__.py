@@ -48,6 +48,6 @@ BENCHES = {
     ),
     "world": (
         "app.bench.world",
-        "T, u and their intervals under each nuisance of a real rig, alone and all together.",
+        "T and u, and the share of points within their 95 % intervals, nuisance by nuisance.",
     ),
 }

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import typer
 
 from app.reconstruct.problem import with_scene
@@ -17,6 +18,7 @@ from app.volume.file import RoomVolume, read_volume
 from app.volume.measurement import synthetic_problem
 from app.volume.scene import RIG_PLACES, Information, RigName, RigOptions
 from app.volume.score import coverage, score_solution
+from core.motion import CameraMotion
 from core.problem import Problem
 from core.scene import FlowModel, Inlet, Scene
 from core.solve.room import RoomSettings, solve_room
@@ -41,6 +43,12 @@ def register(bench: typer.Typer) -> None:
         closure: Annotated[
             Literal["auto", "given", "zero_equation"], typer.Option(help="given: constant viscosity.")
         ] = "auto",
+        drift_px: Annotated[
+            float,
+            typer.Option(
+                help="Nothing is still, and the camera moved by so much (in its quarter-size pixels)."
+            ),
+        ] = 0.0,
         images: Annotated[bool, typer.Option(help="Whether the images correct anything.")] = True,
         cells: Annotated[int, typer.Option(help="Cells of the fine room.")] = 48,
         seeds: Annotated[int, typer.Option(help="Noise seeds 0 to this one, exclusive.")] = 1,
@@ -50,7 +58,7 @@ def register(bench: typer.Typer) -> None:
         settings = RoomSettings(cells=cells, use_images=images, wall_heat=wall_heat)
         for path in truth:
             for seed in range(seeds):
-                problem, volume = problem_of(path, information, light, rig, seed)
+                problem, volume = problem_of(path, information, light, rig, seed, drift_px)
                 problem = entered(problem, wrong, closure)
                 row = {
                     "truth": path.stem,
@@ -59,21 +67,43 @@ def register(bench: typer.Typer) -> None:
                     "rig": rig,
                     "seed": seed,
                 }
-                row |= {"wrong": wrong, "wall_heat": wall_heat, "closure": closure, "images": images}
+                row |= {
+                    "drift_px": drift_px,
+                    "wrong": wrong,
+                    "wall_heat": wall_heat,
+                    "closure": closure,
+                    "images": images,
+                }
                 row |= {"cells": cells} | fit_row(problem, volume, settings)
                 typer.echo(json.dumps(row) if as_json else _sentence(row))
 
 
 def problem_of(
-    path: Path, information: Information, light: Literal["texture", "projector"], rig: RigName, seed: int
+    path: Path,
+    information: Information,
+    light: Literal["texture", "projector"],
+    rig: RigName,
+    seed: int,
+    drift_px: float = 0.0,
 ) -> tuple[Problem, RoomVolume]:
-    """The problem that the default rig's noise makes of a volume."""
+    """The problem that the default rig's noise makes of a volume; with `drift_px` the camera moved as well."""
     volume = read_volume(path)
     stand_off_m, baseline_m = RIG_PLACES[rig]
     options = RigOptions(
         camera_px=_CAMERA_PX, frames=_FRAMES, light=light, stand_off_m=stand_off_m, baseline_m=baseline_m
     )
-    return synthetic_problem(volume, options, information, window_px=_WINDOW_PX, seed=seed), volume
+    problem = synthetic_problem(volume, options, information, window_px=_WINDOW_PX, seed=seed)
+    return moved(problem, drift_px, seed) if drift_px else problem, volume
+
+
+def moved(problem: Problem, drift_px: float, seed: int) -> Problem:
+    """The problem after the camera moved, in each of its four ways, by a draw; known is its deviation alone."""
+    (shift,) = problem.shifts
+    camera = problem.scene.views[0].camera
+    motion = CameraMotion((camera.width_px, camera.height_px), drift_px * np.eye(4))
+    step_px = motion.at(shift.centres_px) @ np.random.default_rng([seed, 77]).standard_normal(4)
+    shift = replace(shift, displacement_px=shift.displacement_px + step_px, motion=motion)
+    return replace(problem, shifts=(shift,))
 
 
 def entered(problem: Problem, wrong: float, closure: str) -> Problem:

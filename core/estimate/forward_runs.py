@@ -49,6 +49,7 @@ class RoomSettings:
     `jacobian_valid`: a Jacobian is computed anew once a parameter has moved this far from where it was computed.
     `jacobian_valid_walls`, `renewals`: the same for the fine room where walls are unknown, and how often at most.
     `fine_step`: rounds on the fine grid end when no parameter moves by more. A march of `final_s` follows.
+    `growing_rounds`, `ensemble_rounds`: rounds of an ensemble's fit in which the data's weight grows, and all.
     `wall_heat`: multiplies the walls' heat coefficient from the heat balance, or the nominal one.
     `log_viscosity_std`: prior deviation of the eddy viscosity's logarithm over the room; None takes the
     closure's (`core.estimate.prior`).
@@ -65,6 +66,8 @@ class RoomSettings:
     jacobian_valid_walls: float = 1.5
     renewals: int = 2
     fine_step: float = 0.3
+    growing_rounds: int = 6
+    ensemble_rounds: int = 12
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 60.0
@@ -87,19 +90,19 @@ class ForwardRun(eqx.Module):
 
 
 class Derivatives(eqx.Module):
-    """Fields of one room, and of rooms with one parameter each moved by `steps` prior deviations."""
+    """Fields of one room, and of others whose parameters lie `apart` from its own, in prior deviations."""
 
     start: RoomFields
-    moved: list[RoomFields]
-    steps: Float[np.ndarray, " active"]
+    others: list[RoomFields]
+    apart: Float[np.ndarray, "others active"]
 
     def per_deviation(self, read: Callable[[RoomFields], ArrayLike]) -> Float[np.ndarray, "active ..."]:
-        """Derivative of `read(fields)` in each parameter, per prior deviation."""
-        before = np.asarray(read(self.start))
-        changes = [
-            (np.asarray(read(run)) - before) / step for run, step in zip(self.moved, self.steps, strict=True)
-        ]
-        return np.stack(changes) if changes else np.zeros((0, *before.shape))
+        """Derivative of `read(fields)` in each parameter, per prior deviation: least squares over the others."""
+        before = np.asarray(read(self.start), float)
+        if not self.others:
+            return np.zeros((0, *before.shape))
+        changes = np.stack([np.asarray(read(run), float) - before for run in self.others])
+        return np.tensordot(np.linalg.pinv(self.apart), changes, axes=1)
 
 
 def run_as_stated(
@@ -204,7 +207,7 @@ def perturbed(
             found.append(run)
             doing = "move one parameter after the other"
             marches.record({"doing": doing, "moved": len(found) - 1.0, "of": float(len(sizes))})
-    return Derivatives(found[0], found[1:], sizes)
+    return Derivatives(found[0], found[1:], np.diag(sizes))
 
 
 def differences(prior: Prior) -> Float[np.ndarray, " active"]:

@@ -38,6 +38,7 @@ _GUESSED_VISCOSITY = {"excess_k": 20.0, "pressure_m2_s2": 1.0, "velocity_m_s": 2
 class Analysis(eqx.Module):
     """A fitted room with everything that its solution and standard deviations are made of.
 
+    `derivatives` are those about the fitted room; `stated` may be those over the prior's spread.
     `coarse`, `first` (on the fine grid) and `other` (another closure) are under the same parameters. `before` is the
     run under the fitted parameters; `best` is the same run held at the measured level, or profile, of T.
     """
@@ -46,6 +47,7 @@ class Analysis(eqx.Module):
     data: Observations
     prior: Prior
     posterior: Posterior
+    stated: Derivatives
     derivatives: Derivatives
     coarse: RoomFields
     first: RoomFields
@@ -157,7 +159,9 @@ def _deviation(
     share: float,
     extra: tuple[np.ndarray | float, np.ndarray | float] = (0.0, 0.0),
 ) -> Deviation:
-    moved = list(analysis.derivatives.per_deviation(lambda run: getattr(run, name)))
+    stated, moved = (
+        of.per_deviation(lambda run: getattr(run, name)) for of in (analysis.stated, analysis.derivatives)
+    )
     between = [
         getattr(run, name) - getattr(analysis.coarse, name) for run in (analysis.first, analysis.other)
     ]
@@ -171,4 +175,4 @@ def _deviation(
     if float(analysis.prior.std.log_viscosity.max()) > 0:
         c *= _GUESSED_VISCOSITY[name]
     represented = Represented(between[0], between[1], scale, (a, c * share, b * share))
-    return deviation(moved, analysis.posterior.covariance, represented, extra)
+    return deviation(stated, moved, analysis.posterior.covariance, represented, extra)

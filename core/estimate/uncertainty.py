@@ -46,19 +46,19 @@ class Deviation(eqx.Module):
 
 
 def deviation(
-    derivatives: list[Field],
+    stated: Float[np.ndarray, "active vx vy vz ..."],
+    derivatives: Float[np.ndarray, "active vx vy vz ..."],
     covariance: Float[np.ndarray, "active active"],
     represented: Represented,
     extra: tuple[Field | float, Field | float] = (0.0, 0.0),
 ) -> Deviation:
-    """Combine the three terms; derivatives are per prior deviation.
+    """Combine the three terms; derivatives are per prior deviation, `stated` about the room as stated.
 
     `extra` are the correction's prior and posterior variances.
     """
-    roots = np.linalg.cholesky(covariance) if len(derivatives) else np.zeros((0, 0))
-    stacked = np.stack(derivatives) if derivatives else np.zeros((0, *represented.grid.shape))
-    after = np.sum(np.tensordot(roots.T, stacked, axes=1) ** 2, axis=0) + extra[1]
-    before = np.sum(stacked**2, axis=0) + extra[0]
+    roots = np.linalg.cholesky(covariance)
+    after = np.sum(np.tensordot(roots.T, derivatives, axes=1) ** 2, axis=0) + extra[1]
+    before = np.sum(stated**2, axis=0) + extra[0]
     # Where nothing is uncertain, `informed` is 0.
     left = represented.deviation() ** 2 + np.finfo(np.float32).tiny
     informed = 1.0 - (after + left) / (before + left)

@@ -129,7 +129,8 @@ def uncertain(
     def run() -> np.ndarray:
         apart = np.full((3, 3, 3), difference)
         represented = Represented(apart, apart, 1.0, (0.5, 0.5, 0.05))
-        found = deviation([np.full((3, 3, 3), derivative)], np.array([[covariance]]), represented)
+        slope = np.full((1, 3, 3, 3), derivative)
+        found = deviation(slope, slope, np.array([[covariance]]), represented)
         return np.stack([found.std, found.informed], axis=-1)
 
     expected = Near(np.broadcast_to([std, informed], (3, 3, 3, 2)), rel=1e-6, abs=1e-9)

@@ -75,11 +75,11 @@ def test_derivatives_are_per_prior_deviation_whatever_the_steps():
             np.array([2.0 * excess_k]),
         )
 
-    found = Derivatives(room_of(1.0), [room_of(7.0), room_of(1.6)], np.array([2.0, 0.3]))
+    found = Derivatives(room_of(1.0), [room_of(7.0), room_of(1.6)], np.diag([2.0, 0.3]))
 
     np.testing.assert_allclose(found.per_deviation(lambda seen: seen.excess_k.mean()), [3.0, 2.0])
     np.testing.assert_allclose(found.per_deviation(lambda seen: seen.outflow_excess_k[0]), [6.0, 4.0])
-    empty = Derivatives(room_of(1.0), [], np.zeros(0))
+    empty = Derivatives(room_of(1.0), [], np.zeros((0, 0)))
     assert empty.per_deviation(lambda seen: seen.excess_k).shape == (0, *VERTICES)
 
 
@@ -98,3 +98,11 @@ def test_one_viscosity_that_nobody_stated_may_vary_over_the_room(flow: FlowModel
 
     assert bool(lattice) == fitted
     assert all(prior.gaussian()[[name in lattice for name in prior.names()]])
+
+
+def test_the_walls_heat_coefficient_closes_the_heat_balance():
+    prior = prior_of(with_walls(**dict.fromkeys(WALLS, 293.15)))
+    heat_m_s = float(np.exp(np.asarray(prior.mean.wall_log_heat)[0]))
+    # 0.096 m3/s come in 5 K warmer than they leave; the air is 5 K above walls of 24 m2 without the openings.
+    openings_m2 = 0.6 * 0.4 + 0.6 * 0.2
+    assert heat_m_s == pytest.approx(0.096 * 5.0 / (5.0 * (24.0 - openings_m2)), rel=0.05)

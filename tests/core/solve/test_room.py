@@ -144,7 +144,7 @@ def test_derivatives_that_point_the_wrong_way_leave_a_room_no_worse_than_stated(
     problem = measured(scene(wrong), truth, 1e-5)
     background = background_of(problem, SETTINGS, Marches())
     data = observations(problem, (SETTINGS.vertices,) * 3)
-    turned = eqx.tree_at(lambda d: d.steps, background.derivatives, -background.derivatives.steps)
+    turned = eqx.tree_at(lambda d: d.apart, background.derivatives, -background.derivatives.apart)
     reported: list[dict] = []
     vector = np.zeros(len(background.prior.active()))
     settings = replace(SETTINGS, rounds=2, final_s=10.0)
@@ -198,7 +198,7 @@ def test_derivatives_are_made_again_where_unknown_walls_have_moved(unknown_walls
 def test_a_search_whose_derivatives_mislead_comes_back_and_learns(unknown_walls: Background):
     background = unknown_walls
     data = observations(background.problem, (SETTINGS.vertices,) * 3)
-    turned = eqx.tree_at(lambda d: d.steps, background.derivatives, -background.derivatives.steps)
+    turned = eqx.tree_at(lambda d: d.apart, background.derivatives, -background.derivatives.apart)
     reported: list[dict] = []
     settings = replace(SETTINGS, rounds=2, renewals=0, fine_step=0.0)
     best, _ = fine_search(
