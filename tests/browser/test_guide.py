@@ -24,7 +24,7 @@ def test_a_calibration_is_guided_from_the_first_view_to_the_response(station: St
     watched = opens(station.address)
     page = watched.page
     go_to(page, "Calibrate")
-    views = page.locator("table.views tbody tr")
+    views = page.locator("table.taken tbody tr")
     expect(page.locator(".wanted")).to_contain_text("Show the board in the middle")
     page.get_by_role("button", name="Take", exact=True).click()
     expect(views).to_have_count(1)

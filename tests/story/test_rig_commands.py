@@ -56,7 +56,7 @@ def test_the_watch_tells_drift_from_what_moves_inside(folder):
 
 def test_a_real_camera_that_is_not_there_is_said(folder, tmp_path):
     text = (folder / "experiment.toml").read_text()
-    start, end = text.index("[rig.camera]"), text.index("[", text.index("[rig.camera]") + 1)
+    start, end = text.index("[rig.camera]"), text.index("[scene.room]")
     camera = f'[rig.camera]\nkind = "v4l2"\ndevice = "{tmp_path}/video0"\n'
     camera += "width_px = 320\nheight_px = 240\nexposure_s = 0.02\n\n"
     other = tmp_path / "experiment"
