@@ -23,7 +23,7 @@ AnyImage = Float[np.ndarray, "_ _"]
 # Beyond this a window is fitted again where it went: a tenth of a pixel is 0.1 % wrong in a texture of 5 px.
 _SMALL_PX = 0.1
 # How far a window that no small shift explains is looked for, at most half of its width.
-_REACH_PX = 8
+REACH_PX = 8
 # A window is looked for where its best small shift leaves this share of the pattern's variance.
 _LOST = 0.1
 # A refused window leaves so many times the rms of the picture's median window,
@@ -97,7 +97,7 @@ def _followed(
         fit = _replaced(fit, far, search.follow(first[far], fit.displacement_px[far], variance[far]))
     lost = _lost(fit)
     if lost.any():
-        start = search.whole_pixels(first[lost], min(_REACH_PX, search.window_px // 2))
+        start = search.whole_pixels(first[lost], min(REACH_PX, search.window_px // 2))
         again = search.follow(first[lost], start, variance[lost])
         better = again.chi_squared < fit.chi_squared[lost]
         lost[lost] = better

@@ -11,7 +11,7 @@ import numpy as np
 
 from app.errors import AirlensError
 from app.experiment.calibration import read_bundle
-from app.experiment.captures import Capture, CapturePair, load_capture
+from app.experiment.captures import MAX_SETTING_OFF, Capture, CapturePair, load_capture
 from app.experiment.folder import Experiment
 from app.rig.conditions import UNTOLD, Conditions, conditions_in, conditions_of
 from calibration.age import warnings_for
@@ -21,8 +21,6 @@ from drivers.verdict import Verdict
 
 # Beyond this the drift that the reconstruction takes out leaves traces of the pattern's own structure.
 MAX_DRIFT_PX = 1.0
-# As near as a camera grants what is asked of it.
-MAX_SETTING_OFF = 0.01
 
 
 def judged(experiment: Experiment, burst: Burst, told: Conditions = UNTOLD) -> Burst:

@@ -34,6 +34,8 @@ from drivers.burst import Burst, BurstOutcome, CapturePlan
 from drivers.capture import Taken
 
 CHECKPOINT_S = 5.0
+# As near as a camera grants what is asked of it.
+MAX_SETTING_OFF = 0.01
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from app.errors import BadInputError
 from app.experiment.captures import Capture, CapturePair
 from app.reconstruct.cover import covered_windows
 from app.reconstruct.drift import Agreement, Exposures, agreement, mount, without_known_drift
+from app.reconstruct.pair import check_pair
 from core.camera_noise import frame_variance, scattered_variance
 from core.displacement import resolve_window_px, window_centres
 from core.drift import Similarity, move_image
@@ -73,6 +74,7 @@ def _measure_view(
     scene: Scene, index: int, view: View, captures: CapturePair
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     exposures = _exposures(scene, index, captures.reference, captures.flow)
+    check_pair(captures.reference, captures.flow, index, exposures.variance)
     shape, window_px = exposures.before.shape, exposures.window_px
     centres = window_centres(shape, window_px)
     in_room = sees_wall(scene, index, centres, margin_px=float(window_px))
