@@ -3,10 +3,11 @@
 Each alternative costs a whole fit. It is tried only where the fitted room leaves much of the images unexplained.
 """
 
+from core.estimate.explained import explained
 from core.estimate.forward_runs import RoomSettings, other_closure
 from core.estimate.marches import Marches
 from core.estimate.parameter_fit import Background
-from core.estimate.posterior import Analysis, unexplained
+from core.estimate.posterior import Analysis
 from core.estimate.unstated_heat import with_suspected_heat
 from core.problem import Problem
 from core.room.forward import Room
@@ -20,7 +21,7 @@ KEEP_HEAT = 0.8
 
 def left_over(analysis: Analysis) -> float:
     """Share (rms) of the measured shifts that a fitted room leaves unexplained."""
-    return unexplained(analysis.data, analysis.best.fields)
+    return explained(analysis.data, analysis.best.fields).share_left
 
 
 def suspected_heat(
@@ -44,5 +45,5 @@ def promising_closure(analysis: Analysis, coarse: Room) -> str | None:
     if analysis.problem.scene.flow.transport != "auto":
         return None
     left = left_over(analysis)
-    worth = left > _TRY_CLOSURE or unexplained(analysis.data, analysis.other) < left
+    worth = left > _TRY_CLOSURE or explained(analysis.data, analysis.other).share_left < left
     return other_closure(coarse) if worth else None

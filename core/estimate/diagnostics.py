@@ -2,6 +2,7 @@
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import norm
 
 from core.estimate.least_squares import Posterior
 from core.estimate.observation import Observations
@@ -11,55 +12,68 @@ from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.scene import Heater, Inlet
 
-# An entry is contradicted if the fit moves it by more than this many prior, and posterior, standard deviations.
-_SIGMAS = 2.0
+# In one room of twenty an entry is called wrong that is as right as it was stated to be.
+_FALSE_ALARMS = 0.05
 # Missing heat is reported above this share of the heat that the supplies bring.
 _MISSING_SHARE = 0.1
 # The velocity is called doubtful if more than this share of the shifts (rms) is unexplained.
 _POOR_FIT = 0.35
+# Correlation of the measured shifts with those of the room as stated, below which they went the other way.
+_OTHER_WAY = -0.5
 # A floor panel is reported if it is warmer, or colder, than the air by at least this.
 _SUSPICIOUS_K = 8.0
 
 
-def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list[str]:
-    """One sentence for each entered value that the measurements contradict."""
+def contradictions(
+    problem: Problem, prior: Prior, posterior: Posterior, by_closure: Float[np.ndarray, " active"]
+) -> list[str]:
+    """One sentence for each entered value that the measurements contradict.
+
+    `by_closure` is how far another closure would move each parameter, in prior deviations. Where entries are as
+    right as stated and the closure is as wrong as that, one room in twenty has such a sentence.
+    """
     fitted = prior.parameters(posterior.vector)
-    moved = dict(zip(prior.names(), posterior.vector, strict=True))
-    own = dict(zip(prior.names(), np.sqrt(np.diag(posterior.covariance)), strict=True))
-    believed = {n for n, v in moved.items() if abs(v) > _SIGMAS and abs(v) > _SIGMAS * own[n]}
+    doubt = np.sqrt(1.0 + by_closure**2)
+    limit = float(norm.ppf(1.0 - _FALSE_ALARMS / (2.0 * max(len(doubt), 1))))
+    times = dict(zip(prior.names(), np.abs(posterior.vector) / doubt, strict=True))
+    believed = {name: n for name, n in times.items() if n > limit}
     inlets = [b for b in problem.scene.boundary if isinstance(b, Inlet)]
     heaters = [b for b in problem.scene.boundary if isinstance(b, Heater)]
     said = []
     for n, inlet in enumerate(inlets):
-        if f"inlet_excess_k[{n}]" in believed:
+        where = f"inlet {n + 1} on {inlet.patch.wall}"
+        if (name := f"inlet_excess_k[{n}]") in believed:
             by_k = float(fitted.inlet_excess_k[n] - prior.mean.inlet_excess_k[n])
+            said.append(_warmer(where, by_k, inlet.temperature_k, believed[name]))
+        if (name := f"inlet_log_flow[{n}]") in believed:
             said.append(
-                f"The measurements say that inlet {n + 1} on {inlet.patch.wall} is "
-                f"{abs(by_k):.1f} K {'warmer' if by_k > 0 else 'colder'} than the "
-                f"{inlet.temperature_k:.2f} K entered. Check it."
-            )
-        if f"inlet_log_flow[{n}]" in believed:
-            factor = float(np.exp(fitted.inlet_log_flow[n]))
-            said.append(
-                f"The measurements say that inlet {n + 1} on {inlet.patch.wall} supplies {factor:.2f} "
-                "times the velocity entered. Check it."
+                f"The measurements say that {where} supplies {float(np.exp(fitted.inlet_log_flow[n])):.2f} times the "
+                f"velocity entered, {_evidence(believed[name])}. Check it."
             )
     for n, heater in enumerate(heaters):
         by_k = float(fitted.heater_excess_k[n] - prior.mean.heater_excess_k[n])
         if isinstance(heater, SuspectedHeater):
             said += suspicion(heater, float(fitted.heater_excess_k[n]) - (leaving_excess_k(problem) or 0.0))
-        elif f"heater_excess_k[{n}]" in believed:
-            said.append(
-                f"The measurements say that the heater on {heater.patch.wall} is "
-                f"{abs(by_k):.1f} K {'warmer' if by_k > 0 else 'colder'} than the "
-                f"{heater.temperature_k:.2f} K entered. Check it."
-            )
+        elif (name := f"heater_excess_k[{n}]") in believed:
+            where = f"the heater on {heater.patch.wall}"
+            said.append(_warmer(where, by_k, heater.temperature_k, believed[name]))
     if "log_closure" in believed:
         said.append(
             f"The measurements ask for {float(np.exp(fitted.log_closure)):.2f} times the closure's eddy "
             "viscosity: another closure may describe this room better."
         )
     return said
+
+
+def _warmer(where: str, by_k: float, entered_k: float, times: float) -> str:
+    return (
+        f"The measurements say that {where} is {abs(by_k):.1f} K {'warmer' if by_k > 0 else 'colder'} than the "
+        f"{entered_k:.2f} K entered, {_evidence(times)}. Check it."
+    )
+
+
+def _evidence(times: float) -> str:
+    return f"{times:.1f} times what the entry and the model may be wrong by"
 
 
 def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
@@ -87,6 +101,16 @@ def misfit(data: Observations, share: float) -> list[str]:
             "inlets, outlets and heaters for something that is not in the scene."
         )
     return said
+
+
+def other_way(likeness: float) -> list[str]:
+    """A sentence if the pictures moved against the room as stated; `likeness` is the correlation of both."""
+    if likeness > _OTHER_WAY:
+        return []
+    return [
+        f"The pictures moved the other way than the room as stated would move them (correlation {likeness:.2f}). "
+        "Reference and flow may be swapped, or a warm supply is entered as a cold one: check both."
+    ]
 
 
 def another_closure(name: str, left: float, stated: str, stated_left: float) -> str:

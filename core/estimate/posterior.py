@@ -6,10 +6,11 @@ from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
 
 from core.air import GRAVITY_M_S2
-from core.estimate.diagnostics import balances, contradictions, misfit, undetermined
+from core.estimate.diagnostics import balances, contradictions, misfit, other_way, undetermined
+from core.estimate.explained import Explained, explained, likeness
 from core.estimate.forward_runs import Derivatives, ForwardRun
 from core.estimate.least_squares import Posterior
-from core.estimate.observation import IMAGES, Observations
+from core.estimate.observation import Observations
 from core.estimate.prior import Prior
 from core.estimate.temperature_nudging import (
     departure,
@@ -24,8 +25,6 @@ from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
 from core.room.vertices import RoomFields
 
-# Unexplained share of the images that is assumed where there are no images.
-_UNSEEN_SHARE = 0.3
 # Shares a, c and b of `core.estimate.uncertainty`.
 _SHARES = {"excess_k": (0.1, 0.3, 1.0), "pressure_m2_s2": (0.3, 1.0, 1.0), "velocity_m_s": (0.2, 5.0, 0.3)}
 # If the thermometers moved the level of T, half of that move is added to its standard deviation: they stand in a few
@@ -38,7 +37,8 @@ _GUESSED_VISCOSITY = {"excess_k": 20.0, "pressure_m2_s2": 1.0, "velocity_m_s": 2
 class Analysis(eqx.Module):
     """A fitted room with everything that its solution and standard deviations are made of.
 
-    `derivatives` are those about the fitted room; `stated` may be those over the prior's spread.
+    `stated_room` is the room as stated. `derivatives` are those about the fitted room; `stated` may be those over the
+    prior's spread.
     `coarse`, `first` (on the fine grid) and `other` (another closure) are under the same parameters. `before` is the
     run under the fitted parameters; `best` is the same run held at the measured level, or profile, of T.
     """
@@ -47,6 +47,7 @@ class Analysis(eqx.Module):
     data: Observations
     prior: Prior
     posterior: Posterior
+    stated_room: RoomFields
     stated: Derivatives
     derivatives: Derivatives
     coarse: RoomFields
@@ -74,10 +75,10 @@ def solution(
         for v in (change.prior_variance_k2, change.variance_k2)
     )
     bent = hydrostatic_variance_m4_s4(problem, z, before), hydrostatic_variance_m4_s4(problem, z, after)
-    share = unexplained(analysis.data, best.fields)
-    temperature = _deviation(analysis, "excess_k", local_k, share, (before, after))
-    pressure = _deviation(analysis, "pressure_m2_s2", departure(best.fields.pressure_m2_s2), share, bent)
-    velocity = _deviation(analysis, "velocity_m_s", rms(best.fields.velocity_m_s), share)
+    seen = explained(analysis.data, best.fields)
+    temperature = _deviation(analysis, "excess_k", local_k, seen, (before, after))
+    pressure = _deviation(analysis, "pressure_m2_s2", departure(best.fields.pressure_m2_s2), seen, bent)
+    velocity = _deviation(analysis, "velocity_m_s", rms(best.fields.velocity_m_s), seen)
     return Solution(
         x,
         y,
@@ -91,21 +92,32 @@ def solution(
         temperature.informed,
         outcome=best.flow.outcome,
         solver_s=seconds,
-        notes=(*notes, *sentences(analysis, share)),
+        notes=(*notes, *sentences(analysis, seen)),
     )
 
 
-def sentences(analysis: Analysis, share: float) -> list[str]:
-    """Sentences for the operator; `share` of the images is left unexplained."""
+def sentences(analysis: Analysis, seen: Explained) -> list[str]:
+    """Sentences for the operator; `seen` is what the room explains of the images."""
     parameters = analysis.best.parameters
     inflow = np.asarray(analysis.layout.inflow_m3_s(parameters), float)
     return [
         *analysis.layout.notes,
         *undetermined(analysis.problem),
-        *contradictions(analysis.problem, analysis.prior, analysis.posterior),
-        *misfit(analysis.data, share),
+        *contradictions(analysis.problem, analysis.prior, analysis.posterior, moved_by_closure(analysis)),
+        *misfit(analysis.data, seen.share_left),
+        *other_way(likeness(analysis.data, analysis.stated_room)),
         *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, held_k_m3_s(analysis)),
     ]
+
+
+def moved_by_closure(analysis: Analysis) -> Float[np.ndarray, " active"]:
+    """How far each parameter would move, in prior deviations, were the air that of the other closure."""
+    if not len(analysis.posterior.deviation):
+        return np.zeros(len(analysis.posterior.vector))
+    jacobian = analysis.derivatives.per_deviation(analysis.data.predicted).T
+    other, own = (analysis.data.predicted(fields) for fields in (analysis.other, analysis.coarse))
+    weighted = jacobian.T / analysis.posterior.deviation**2
+    return np.abs(analysis.posterior.covariance @ weighted @ (other - own))
 
 
 def outflow_excess_k(analysis: Analysis) -> float:
@@ -119,16 +131,6 @@ def held_k_m3_s(analysis: Analysis) -> float:
     """The heat source, over rho c and the whole room, that held the measured temperatures."""
     box = analysis.problem.scene.room
     return (analysis.best.flow.held_k_s or 0.0) * float(np.prod(box.size_m))
-
-
-def unexplained(data: Observations, fields: RoomFields) -> float:
-    """Share (rms) of the measured shifts that these fields leave unexplained."""
-    values, _, group = data.values()
-    shifts = group == IMAGES
-    if not shifts.any():
-        return _UNSEEN_SHARE
-    left = (values - data.predicted(fields))[shifts]
-    return float(np.linalg.norm(left) / max(float(np.linalg.norm(values[shifts])), 1e-30))
 
 
 def hydrostatic_m2_s2(
@@ -156,7 +158,7 @@ def _deviation(
     analysis: Analysis,
     name: str,
     scale: float,
-    share: float,
+    seen: Explained,
     extra: tuple[np.ndarray | float, np.ndarray | float] = (0.0, 0.0),
 ) -> Deviation:
     stated, moved = (
@@ -174,5 +176,7 @@ def _deviation(
     a, c, b = _SHARES[name]
     if float(analysis.prior.std.log_viscosity.max()) > 0:
         c *= _GUESSED_VISCOSITY[name]
-    represented = Represented(between[0], between[1], scale, (a, c * share, b * share))
+    # The room's own size, by its own signal: what is left tells what the room lacks, not what it has.
+    shares = (a, c * seen.share_left, b * seen.left_over_own)
+    represented = Represented(between[0], between[1], scale, shares)
     return deviation(stated, moved, analysis.posterior.covariance, represented, extra)

@@ -31,8 +31,9 @@ _WALL_HEAT_STD = 0.6
 # With unknown walls the common coefficient is nearly the same degree of freedom as their temperatures.
 _SHARED_HEAT_STD = 0.3
 # Deviation of an unknown wall's temperature: this share of its distance from the air, and at least that of the
-# contrast.
-_WALL_SHARE, _LEAST_WALL_SHARE = 1.0, 0.2
+# contrast. Whatever the supply, an outer wall of 0.5 W/m2K is 1.3 K from the air in 20 K of frost, by the surface
+# resistance of ISO 6946 (0.13 m2K/W).
+_WALL_SHARE, _LEAST_WALL_SHARE, _LEAST_WALL_K = 1.0, 0.2, 1.3
 # Heat coefficient of a heater [m/s], 3 W/m2K over rho c, and one sigma of its logarithm.
 _HEATER_HEAT_M_S, _HEATER_HEAT_STD = 2.5e-3, 0.6
 # A freely fitted viscosity would absorb every other error and make the velocity worse: k-epsilon's is kept close.
@@ -166,7 +167,7 @@ def room_prior(
         _f32([max(i.temperature_std_k, _LEAST_SHARE_T * contrast) for i in inlets]),
         _f32([max(i.velocity_std_m_s / s, _LEAST_SHARE_U) for i, s in zip(inlets, speed, strict=True)]),
         jnp.float32((_SHARED_HEAT_STD if free.any() else _WALL_HEAT_STD) * float(layout.heated.any())),
-        _f32(np.where(free, max(_WALL_SHARE * apart_k, _LEAST_WALL_SHARE * contrast), 0.0)),
+        _f32(np.where(free, max(_WALL_SHARE * apart_k, _LEAST_WALL_SHARE * contrast, _LEAST_WALL_K), 0.0)),
         jnp.zeros(6),
         _f32([h.temperature_std_k for h in heaters]),
         _f32([_HEATER_HEAT_STD * (not isinstance(h, SuspectedHeater)) for h in heaters]),

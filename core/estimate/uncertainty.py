@@ -1,12 +1,13 @@
 """Standard deviations of a marched room: from its parameters, grid, closure and last correction.
 
-    var = D C D^T + (a |f_fine - f_coarse| + c m |f_other - f_coarse| + b m s)^2 + var_correction
+    var = D C D^T + (a |f_fine - f_coarse| + c m |f_other - f_coarse| + b r s)^2 + var_correction
 
 D holds the fields' derivatives in the fitted parameters, and C is their posterior covariance. The second term is
 the representation error of grid and closure: two grids differ by about the error of the finer one, and two closures
-by about the error of either. Both differences are smoothed. m is the share of the images that the room leaves
-unexplained, and s the rms size of the field. a, b and c were set so that 95 % intervals hold: for u and p on two
-reference rooms (A and C), for T on six rooms, four of which have another closure or a plume.
+by about the error of either. Both differences are smoothed. s is the rms size of the field. m is what the room
+leaves of the images, as a share of their signal, and r the same as a share of the room's own. a, b and c were set so
+that 95 % intervals hold: for u and p on two reference rooms (A and C), for T on six rooms, four of which have another
+closure or a plume.
 """
 
 import equinox as eqx
@@ -21,7 +22,7 @@ _SMOOTH_VERTICES = 2.5
 
 
 class Represented(eqx.Module):
-    """Representation error: differences of two grids and of two closures, the scale s, and a, c m, b m."""
+    """Representation error: differences of two grids and of two closures, the scale s, and a, c m, b r."""
 
     grid: Field
     closure: Field

@@ -79,6 +79,17 @@ ROOMS = {
         heater={"x": [0.2, 0.8], "y": [-0.3, 0.3], "dT": 60.0},
         closure_factor=1.3,
     ),
+    "weak_plume": Made(
+        domain=(-1.6, 1.8, -1.5, 1.5, 0.0, 2.7),
+        vertices=(58, 50, 48),
+        closure="k_epsilon",
+        cells=56,
+        title="plume over a warm floor patch, supply at the room's temperature",
+        inlets=({**_box((-0.5, 0.5), (0.1, 0.5)), "U": 0.05, "dT": 0.0},),
+        outlet=_box((-0.3, 0.3), (2.25, 2.5)),
+        heater={"x": [0.0, 0.6], "y": [-0.2, 0.4], "dT": 25.0},
+        closure_factor=0.8,
+    ),
     "two_inlets": Made(
         domain=(-1.2, 2.6, -1.6, 1.6, 0.0, 2.8),
         vertices=(60, 52, 46),

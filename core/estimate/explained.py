@@ -1,0 +1,63 @@
+"""How much of the measured shifts a room explains, beyond their noise."""
+
+import equinox as eqx
+import numpy as np
+
+from core.estimate.observation import IMAGES, Observations
+from core.room.vertices import RoomFields
+
+# Share left that is assumed where the images do not tell it: there are none, or all that they show may be noise.
+_UNSEEN_SHARE = 0.3
+
+
+class Explained(eqx.Module):
+    """Rms shifts [px]: the measured signal, what a room predicts of it, and what it leaves.
+
+    Noise is taken out of the first and of the last. All three hold how well its power is known, so that a picture
+    that shows nothing but noise says nothing against a room.
+    """
+
+    measured_px: float
+    predicted_px: float
+    left_px: float
+
+    @property
+    def share_left(self) -> float:
+        """Share of the measured signal that is left, 0 to 1 and more."""
+        return self.left_px / self.measured_px
+
+    @property
+    def left_over_own(self) -> float:
+        """What is left, over the room's own signal: more than the share left where the room lacks something."""
+        return self.left_px / self.predicted_px
+
+
+def explained(data: Observations, fields: RoomFields) -> Explained:
+    """What these fields explain of the images; a share of 0.3 is left where there are none."""
+    values, variance, group = data.values()
+    shifts = group == IMAGES
+    if not shifts.any():
+        return Explained(1.0, 1.0, _UNSEEN_SHARE)
+    values, predicted, variance = values[shifts], data.predicted(fields)[shifts], variance[shifts]
+    noise = float(variance.sum())
+    # One standard deviation of the noise's power.
+    doubt = float(np.sqrt(2.0 * np.sum(variance**2)))
+
+    def rms(power: float) -> float:
+        return float(np.sqrt(max(power, np.finfo(np.float32).tiny) / len(values)))
+
+    left = values - predicted
+    return Explained(
+        rms(max(float(values @ values) - noise, 0.0) + doubt),
+        rms(float(predicted @ predicted) + doubt),
+        rms(max(float(left @ left) - noise, 0.0) + _UNSEEN_SHARE**2 * doubt),
+    )
+
+
+def likeness(data: Observations, fields: RoomFields) -> float:
+    """Correlation of the measured shifts with what these fields show, -1 to 1; 0 where there are no images."""
+    values, _, group = data.values()
+    shifts = group == IMAGES
+    predicted = data.predicted(fields)[shifts]
+    size = float(np.linalg.norm(values[shifts]) * np.linalg.norm(predicted))
+    return float(values[shifts] @ predicted) / max(size, float(np.finfo(np.float32).tiny))

@@ -1,0 +1,108 @@
+"""What a room explains of the images, with the noise taken out, and what may then be said of entries."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from core.estimate.diagnostics import contradictions, other_way
+from core.estimate.explained import explained, likeness
+from core.estimate.least_squares import Posterior
+from core.estimate.observation import observations
+from core.problem import Problem, ShiftMeasurement
+from core.room.vertices import RoomFields
+from tests.core.estimate.test_temperature_nudging import prior_of, problem
+
+VERTICES = (8, 8, 8)
+
+
+def room_of(warmer_k: float) -> RoomFields:
+    """Air that is warmer by so much at the ceiling than on the floor."""
+    warm = np.broadcast_to(warmer_k * np.linspace(0.0, 1.0, VERTICES[2]) ** 2, VERTICES).copy()
+    return RoomFields(warm, np.zeros(VERTICES), np.zeros((*VERTICES, 3)), np.zeros(1))
+
+
+def seen(warmer_k: float, noise: float, seed: int = 0) -> Problem:
+    """Pictures of that air with `noise` times its rms shift; the scene is the tests' own."""
+    given = problem(stated=True)
+    camera = given.scene.views[0].camera
+    across = np.arange(8.0, camera.width_px, 16.0), np.arange(8.0, camera.height_px, 16.0)
+    centres = np.stack(np.meshgrid(*across), -1).reshape(-1, 2)
+    clean = ShiftMeasurement(
+        centres, np.zeros((len(centres), 2)), np.tile(1e8 * np.eye(2), (len(centres), 1, 1)), 16
+    )
+    operator = observations(Problem(given.scene, (clean,)), VERTICES).shifts[0].operator
+    refractivity = given.scene.air.excess_refractivity(jnp.asarray(room_of(warmer_k).excess_k, jnp.float32))
+    shift = np.asarray(eqx.filter_jit(lambda o, e: o.apply(e))(operator, refractivity))
+    std_px = noise * float(np.sqrt(np.mean(shift**2)))
+    shift = shift + std_px * np.random.default_rng(seed).normal(size=shift.shape)
+    information = np.tile(np.eye(2) / std_px**2, (len(centres), 1, 1))
+    return Problem(given.scene, (replace(clean, displacement_px=shift, information_per_px2=information),))
+
+
+def test_the_share_that_is_left_is_that_of_the_signal():
+    data = observations(seen(4.0, 0.05), VERTICES)
+
+    half = explained(data, room_of(2.0))
+    assert half.share_left == pytest.approx(0.5, abs=0.03)
+    # A room that has half of it lacks as much as it has.
+    assert half.left_over_own == pytest.approx(1.0, abs=0.06)
+    assert explained(data, room_of(4.0)).share_left < 0.1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_is_not_held_against_a_room(seed: int):
+    data = observations(seen(4.0, 3.0, seed), VERTICES)
+
+    values, _, _ = data.values()
+    left = values - data.predicted(room_of(4.0))
+    assert np.linalg.norm(left) > 0.85 * np.linalg.norm(values)
+    assert explained(data, room_of(4.0)).share_left < 0.6
+
+
+def test_where_all_is_noise_the_share_is_the_one_without_images():
+    data = observations(seen(4.0, 300.0), VERTICES)
+    nothing = explained(observations(Problem(data.scene, ()), VERTICES), room_of(4.0))
+
+    assert nothing.share_left == pytest.approx(0.3)
+    assert explained(data, room_of(4.0)).left_over_own < 1.5
+
+
+def test_pictures_that_went_the_other_way_are_told_and_those_of_noise_are_not():
+    right, noise = (observations(seen(4.0, n), VERTICES) for n in (0.3, 30.0))
+
+    assert likeness(right, room_of(3.0)) > 0.8
+    assert not other_way(likeness(right, room_of(3.0)))
+    assert "swapped" in other_way(likeness(right, room_of(-3.0)))[0]
+    assert not other_way(likeness(noise, room_of(-3.0)))
+
+
+@pytest.mark.parametrize(("closure", "told"), [(0.0, True), (2.0, False)])
+def test_an_entry_is_called_wrong_only_beyond_what_entry_and_closure_allow(closure: float, told: bool):
+    given = problem(stated=True)
+    prior = prior_of(given)
+    own = prior.names().index("inlet_log_flow[0]")
+    vector = np.zeros(len(prior.names()))
+    vector[own] = 4.0
+    found = Posterior(vector, 0.01 * np.eye(len(vector)), np.zeros(0))
+
+    said = contradictions(given, prior, found, np.full(len(vector), closure))
+
+    assert len(said) == told
+    assert all("4.0 times what the entry and the model may be wrong by" in text for text in said)
+
+
+def test_of_rooms_with_right_entries_one_in_twenty_has_such_a_sentence():
+    given = problem(stated=True)
+    prior = prior_of(given)
+    rng = np.random.default_rng(5)
+    active = len(prior.names())
+    alarms = 0
+    for _ in range(400):
+        by_closure = rng.uniform(0.0, 2.0, active)
+        vector = np.sqrt(1.0 + by_closure**2) * rng.normal(size=active)
+        found = Posterior(vector, 0.01 * np.eye(active), np.zeros(0))
+        alarms += bool(contradictions(given, prior, found, by_closure))
+    assert 0.01 < alarms / 400 < 0.08
