@@ -41,8 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     options = parser.parse_args(arguments)
     stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+    hear(stop)
     folder = JobFolder(options.folder.resolve())
     owner = folder.owner()
     if options.attempt not in (None, owner.attempt):
@@ -61,6 +60,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         threading.Thread(target=_renew, args=(folder, owner, options.lease_s), daemon=True).start()
         threading.Thread(target=_end_soon, args=(folder, owner, stop), daemon=True).start()
         return _attempt(folder, owner, stop)
+
+
+def hear(stop: threading.Event) -> None:
+    """Set `stop` at SIGTERM and SIGINT: at once, also while the main thread is in one long call, as in a compilation.
+
+    Python calls a handler only between two steps of the main thread; the system writes to a socket at once.
+    """
+    hearing, told = socket.socketpair()
+    told.setblocking(False)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    signal.set_wakeup_fd(told.detach(), warn_on_full_buffer=False)
+
+    def listen() -> None:
+        hearing.recv(1)
+        stop.set()
+
+    threading.Thread(target=listen, daemon=True).start()
 
 
 def _attempt(folder: JobFolder, owner: Owner, stop: threading.Event) -> int:
