@@ -20,6 +20,7 @@ import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 from app import worker
 from app.experiment.results import read_result
@@ -78,7 +79,7 @@ class Runs:
         return b"".join(b"" if field is None else field.tobytes() for field in fields)
 
 
-def work(folder: str, cells: int) -> int:
+def work(folder: str, cells: int) -> NoReturn:
     """Be the worker, with a smaller room."""
     if cells:
         small = replace(presets.STANDARD, cells=cells, coarse_cells=cells * 2 // 3, vertices=cells + 1)
@@ -87,7 +88,7 @@ def work(folder: str, cells: int) -> int:
             return solve_room(problem, small, watch)
 
         presets.PRESETS = {**presets.PRESETS, "standard": solve}
-    return worker.main([folder])
+    worker.end(worker.main([folder]))
 
 
 def disturbed(runs: Runs, number: signal.Signals, share: float, later_s: float) -> dict[str, object] | None:
@@ -157,7 +158,7 @@ def main() -> int:
     parser.add_argument("--work", help="be the worker of this job's folder")
     options = parser.parse_args()
     if options.work:
-        return work(options.work, options.cells)
+        work(options.work, options.cells)
     with tempfile.TemporaryDirectory() as scratch:
         measured(options, Path(scratch))
     return 0
