@@ -22,7 +22,8 @@ def encode(value: Any) -> Any:
     if isinstance(value, dict):
         return {str(key): encode(item) for key, item in value.items()}
     if isinstance(value, tuple):
-        return [encode(item) for item in value]
+        plain = all(type(item) in (float, int, str) for item in value)
+        return list(value) if plain else [encode(item) for item in value]
     return value
 
 
