@@ -29,7 +29,7 @@ from app.jobs.folder import JobFolder, Owner, beat, try_lock
 from app.jobs.worker_status import DONE, FAILED, FENCED, NO_SPACE, STOPPED, TAKEN
 
 # How long a computation has to hear of a stop and keep what it has.
-_STOP_S = 4.0
+_STOP_S = 3.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
