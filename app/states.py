@@ -14,7 +14,7 @@ E = TypeVar("E", bound=StrEnum)
 
 
 @dataclass(frozen=True)
-class Machine(Generic[S, E]):
+class StateMachine(Generic[S, E]):
     """States, events and what follows; `asked` are the events that a person asks for.
 
     Raises `error` for an event that means nothing in a state.

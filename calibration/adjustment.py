@@ -157,7 +157,9 @@ def _project(sighting: Sighting, device: Device, pose: Pose) -> tuple[np.ndarray
 
 def _stack(composed: tuple, rr: int, rt: int, tr: int, tt: int) -> np.ndarray:
     """The 6 x 6 derivative of the composed (rotation, translation) by one of the two."""
-    return np.block([[composed[rr], composed[rt]], [composed[tr], composed[tt]]])
+    by = np.empty((6, 6))
+    by[:3, :3], by[:3, 3:], by[3:, :3], by[3:, 3:] = (composed[n] for n in (rr, rt, tr, tt))
+    return by
 
 
 def _step(normal: np.ndarray, gradient: np.ndarray, damping: float, boards: int) -> np.ndarray:

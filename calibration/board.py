@@ -6,11 +6,13 @@ centre's picture (some 0.01 px at 20 px radius and 30 degrees), so corners are p
 """
 
 from dataclasses import dataclass
+from typing import assert_never
 
 import cv2
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from calibration.board_kind import BoardKind
 from calibration.errors import CalibrationError
 
 Image = Shaped[np.ndarray, "rows cols"]
@@ -38,6 +40,11 @@ class Chessboard:
 
     def __post_init__(self) -> None:
         _check_size(self.columns, self.rows, self.square_m)
+
+    @property
+    def pitch_m(self) -> float:
+        """Size of a square."""
+        return self.square_m
 
     @property
     def points_m(self) -> Float[np.ndarray, "points 3"]:
@@ -90,6 +97,11 @@ class CharucoBoard:
             )
 
     @property
+    def pitch_m(self) -> float:
+        """Size of a square."""
+        return self.square_m
+
+    @property
     def points_m(self) -> Float[np.ndarray, "points 3"]:
         """Inner corners on the board plane z = 0, row by row; (0, 0) is the board's own corner."""
         return np.asarray(self._board().getChessboardCorners(), np.float64).reshape(-1, 3)
@@ -135,6 +147,11 @@ class CircleGrid:
         _check_size(self.columns, self.rows, self.spacing_m)
 
     @property
+    def pitch_m(self) -> float:
+        """From circle to circle in a row."""
+        return self.spacing_m
+
+    @property
     def points_m(self) -> Float[np.ndarray, "points 3"]:
         """Centres on the board plane z = 0, row by row."""
         if not self.asymmetric:
@@ -166,6 +183,23 @@ class CircleGrid:
 
 
 Board = Chessboard | CharucoBoard | CircleGrid
+# A marker's edge where nobody tells it, in squares.
+_MARKER = 0.75
+
+
+def board_of(
+    kind: BoardKind, columns: int, rows: int, pitch_m: float, marker_m: float | None, dictionary: str
+) -> Board:
+    """The board of a kind; marker and dictionary are a ChArUco board's. Raises CalibrationError."""
+    match kind:
+        case "chessboard":
+            return Chessboard(columns, rows, pitch_m)
+        case "charuco":
+            return CharucoBoard(columns, rows, pitch_m, marker_m or _MARKER * pitch_m, dictionary)
+        case "circles" | "asymmetric-circles":
+            return CircleGrid(columns, rows, pitch_m, kind == "asymmetric-circles")
+        case _:
+            assert_never(kind)
 
 
 def to_8_bit(image: Image) -> np.ndarray:

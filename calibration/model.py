@@ -21,7 +21,7 @@ from calibration.pair import Pair, fit_pair
 from calibration.record import Record, SeenBoard, array_of
 from calibration.vertical import level_of
 from calibration.wall import Correspondences, Plane
-from calibration.world import Anchor, World, difference, levelled, optics_in, world_of
+from calibration.world import Anchor, WorldPose, difference, levelled, optics_in, world_of
 
 MINIMUM_VIEWS = 3
 
@@ -35,7 +35,7 @@ class Model:
     pair: Pair | None
     flat_wall: FlatWall | None
     plane: Plane | None
-    world: World
+    world: WorldPose
     camera_optics: CalibratedOptics
     projector_optics: CalibratedOptics | None
     wall: CalibratedWall | None
@@ -140,7 +140,7 @@ def _over(pose: np.ndarray) -> np.ndarray:
     return normal / (normal @ pose[3:])
 
 
-def _world(record: Record, state: _State, up: np.ndarray) -> World:
+def _world(record: Record, state: _State, up: np.ndarray) -> WorldPose:
     if state.plane is None:
         return levelled(state.devices[0])
     place = record.placement
@@ -148,7 +148,7 @@ def _world(record: Record, state: _State, up: np.ndarray) -> World:
     return world_of(state.devices[0], state.plane.normal, state.plane.offset_m, up, anchor)
 
 
-def _optics(record: Record, state: _State, up: np.ndarray, world: World) -> tuple[tuple, tuple | None]:
+def _optics(record: Record, state: _State, up: np.ndarray, world: WorldPose) -> tuple[tuple, tuple | None]:
     """(optics, covariance) of the camera; (optics, covariance, cross) of the projector."""
     sizes = [record.camera_size_px, record.panel_size_px or (1, 1)]
     now = [optics_in(world, d, s) for d, s in zip(state.devices, sizes, strict=False)]
@@ -192,7 +192,7 @@ def _moved(state: _State, index: int, step: float) -> _State:
 
 
 def _calibrated_wall(
-    record: Record, state: _State, flat: FlatWall | None, world: World
+    record: Record, state: _State, flat: FlatWall | None, world: WorldPose
 ) -> CalibratedWall | None:
     plane = state.plane
     if plane is None:

@@ -22,7 +22,8 @@ def encode(value: Any) -> Any:
     if isinstance(value, dict):
         return {str(key): encode(item) for key, item in value.items()}
     if isinstance(value, tuple):
-        return [encode(item) for item in value]
+        plain = all(type(item) in (float, int, str) for item in value)
+        return list(value) if plain else [encode(item) for item in value]
     return value
 
 
@@ -84,8 +85,24 @@ def _tuple(arguments: tuple[Any, ...], item: Any, where: str) -> tuple[Any, ...]
     else:
         kinds = arguments
         _expect(len(item) == len(kinds), item, where, f"a list of {len(kinds)}")
+    if _are_rows(kinds, item):
+        return tuple(tuple(map(float, row)) for row in item)
     return tuple(
         _value(kind, entry, f"{where}[{i}]") for i, (kind, entry) in enumerate(zip(kinds, item, strict=True))
+    )
+
+
+def _are_rows(kinds: tuple[Any, ...], item: list[Any]) -> bool:
+    """Whether all entries are rows of finite numbers, as they should be: corners are thousands, and read often."""
+    if not kinds or get_origin(kinds[0]) is not tuple or kinds.count(kinds[0]) < len(kinds):
+        return False
+    row: tuple[Any, ...] = get_args(kinds[0])
+    entries: list[Any] = item
+    return set(row) <= {float, Ellipsis} and all(
+        isinstance(entry, list)
+        and (Ellipsis in row or len(entry) == len(row))
+        and all(type(x) in (float, int) and math.isfinite(x) for x in entry)
+        for entry in entries
     )
 
 

@@ -33,14 +33,14 @@ class Anchor:
 
 
 @dataclass(frozen=True)
-class World:
+class WorldPose:
     """world = rotation @ (camera coordinates) + position_m."""
 
     rotation: Float[np.ndarray, "3 3"]
     position_m: Vector
 
 
-def world_of(camera: Device, normal: Vector, offset_m: float, up: Vector, anchor: Anchor) -> World:
+def world_of(camera: Device, normal: Vector, offset_m: float, up: Vector, anchor: Anchor) -> WorldPose:
     """The world in which the plane normal . x = offset_m (camera frame) is y = const and `up` is up."""
     y_axis = normal / np.linalg.norm(normal)
     z_axis = up - (up @ y_axis) * y_axis
@@ -53,15 +53,15 @@ def world_of(camera: Device, normal: Vector, offset_m: float, up: Vector, anchor
     wall_y_m = offset_m if anchor.wall_y_m is None else anchor.wall_y_m
     seen = rotation @ known
     position = np.array([anchor.x_m - seen[0], wall_y_m - offset_m, anchor.z_m - seen[2]])
-    return World(rotation, position)
+    return WorldPose(rotation, position)
 
 
-def levelled(camera: Device) -> World:
+def levelled(camera: Device) -> WorldPose:
     """The world before any wall is known: the camera at the origin, level, looking along +y."""
-    return World(np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]), np.zeros(3))
+    return WorldPose(np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]), np.zeros(3))
 
 
-def optics_in(world: World, device: Device, size_px: tuple[int, int]) -> Optics:
+def optics_in(world: WorldPose, device: Device, size_px: tuple[int, int]) -> Optics:
     """The device, whose pose is relative to the camera, as optics in the world."""
     device_from_camera = cv2.Rodrigues(np.asarray(device.rotation_rad, float))[0]
     centre = -device_from_camera.T @ device.translation_m

@@ -77,7 +77,7 @@ class FrameGate:
                 "Lower the frame rate or close other programs if this repeats.",
                 steps - 1,
             )
-        if consecutive and elapsed_s > self._late_factor * self._period_s * steps:
+        if consecutive and elapsed_s > self._late_factor * self._period_s:
             self._refuse(
                 FrameFault.LATE,
                 f"Frame {arrival.sequence} came {elapsed_s:.4f} s after the one before; the period is "

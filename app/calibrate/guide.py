@@ -101,7 +101,7 @@ class GuidedCalibration:
     ) -> tuple[str, ...]:
         """Take the pictures of what is wanted, use them, and return what is wrong with them.
 
-        Raises StoppedError, AirlensError, DeviceError; pictures taken before that are kept.
+        Raises CalibrationStoppedError, AirlensError, DeviceError; pictures taken before that are kept.
         """
         task = self.wanted()
         if task is None:

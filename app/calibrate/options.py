@@ -1,7 +1,6 @@
 """Options of `airlens calibrate`, and what they mean: boards, lengths, places."""
 
 import re
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -10,19 +9,10 @@ import typer
 from app.calibrate.folder import CalibrationFolder
 from app.errors import BadInputError
 from app.rig.conditions import Conditions
-from calibration.board import Board, CharucoBoard, Chessboard, CircleGrid
+from calibration.board import Board, board_of
+from calibration.board_kind import BoardKind
 from calibration.errors import CalibrationError
 from calibration.record import Placement
-
-
-class BoardKind(StrEnum):
-    """Kinds of boards."""
-
-    chessboard = "chessboard"
-    charuco = "charuco"
-    circles = "circles"
-    asymmetric_circles = "asymmetric-circles"
-
 
 Folder = Annotated[Path, typer.Argument(help="The experiment's folder.")]
 Images = Annotated[Path | None, typer.Option(help="Folder of pictures; without it, live on the rig.")]
@@ -67,13 +57,9 @@ def make_board(kind: BoardKind, grid: str, square: str, marker: str | None, dict
     """The board that the options describe. Raises BadInputError."""
     columns, rows = size_of(grid, "--grid", "9x7")
     square_m = length_m(square, "--square")
+    marker_m = None if marker is None else length_m(marker, "--marker")
     try:
-        if kind is BoardKind.chessboard:
-            return Chessboard(columns, rows, square_m)
-        if kind is BoardKind.charuco:
-            marker_m = 0.75 * square_m if marker is None else length_m(marker, "--marker")
-            return CharucoBoard(columns, rows, square_m, marker_m, dictionary)
-        return CircleGrid(columns, rows, square_m, kind is BoardKind.asymmetric_circles)
+        return board_of(kind, columns, rows, square_m, marker_m, dictionary)
     except CalibrationError as error:
         raise BadInputError(str(error)) from error
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import tifffile
 
-from app.capture.burst import Watch, shoot
+from app.capture.burst import BurstWatch, shoot
 from app.errors import AirlensError
 from app.files.durable import write_durably
 from app.rig.stage import Stage
@@ -26,7 +26,7 @@ from drivers.protocols import Frame
 OnPicture = Callable[[int, int], object]
 
 
-class StoppedError(AirlensError):
+class CalibrationStoppedError(AirlensError):
     """The operator stopped; what was taken before is kept."""
 
 
@@ -40,7 +40,10 @@ class Shooter:
         self._progress, self._abort = progress, abort or (lambda: False)
 
     def one(self, file: Path) -> Path:
-        """Take one picture (the mean of `frames`) and return where it was kept. Raises StoppedError, DeviceError."""
+        """Take one picture (the mean of `frames`) and return where it was kept.
+
+        Raises CalibrationStoppedError, DeviceError.
+        """
         newest: list[Frame] = []
 
         def remember(taken: Taken) -> None:
@@ -81,7 +84,7 @@ class Shooter:
             self._show(np.full((height_px, width_px), level, np.uint8))
 
     def _shoot(self, where: Path, plan: CapturePlan, on_frame: OnFrame) -> Burst:
-        watch = Watch(frame=on_frame, stop=lambda: "keep" if self._abort() else None)
+        watch = BurstWatch(frame=on_frame, stop=lambda: "keep" if self._abort() else None)
         return shoot(self._stage.camera, where, plan, watch)
 
     def _show(self, picture: Picture) -> None:
@@ -118,7 +121,7 @@ def save(file: Path, pixels: np.ndarray) -> Path:
 
 def _check(outcome: BurstOutcome, where: Path) -> None:
     if outcome is BurstOutcome.ABORTED:
-        raise StoppedError(
+        raise CalibrationStoppedError(
             "Stopped. The pictures taken so far are kept; the same command goes on from there."
         )
     if outcome is not BurstOutcome.COMPLETE:

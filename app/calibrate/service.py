@@ -14,14 +14,14 @@ from typing import Any
 
 from app.calibrate.folder import CalibrationFolder, StepName
 from app.calibrate.guide import GuidedCalibration, LivePlan
-from app.calibrate.pictures import StoppedError
+from app.calibrate.pictures import CalibrationStoppedError
 from app.errors import AirlensError
 from app.experiment.folder import Experiment
 from app.rig.conditions import Conditions, conditions_of
 from app.rig.live_camera import LiveCamera
 from app.rig.open import open_camera, open_stage, panel_of
 from app.rig.stage import RealStage, Stage, Task, UnopenedStage
-from app.states import Machine
+from app.states import StateMachine
 from drivers.display import PatternDisplay
 from drivers.errors import DeviceBusyError, DeviceError
 
@@ -46,7 +46,7 @@ class GuideEvent(StrEnum):
     fail = "fail"
 
 
-GUIDE = Machine(
+GUIDE = StateMachine(
     name="A calibration",
     table={
         GuideState.idle: {GuideEvent.take: GuideState.running, GuideEvent.discard: GuideState.idle},
@@ -180,7 +180,7 @@ class CalibrationDesk:
     def _run(self, run: "_Run", experiment: Experiment, plan: LivePlan, told: Conditions) -> None:
         try:
             issues = self._take(run, experiment, plan, told)
-        except StoppedError as stop:
+        except CalibrationStoppedError as stop:
             self._end(run, GuideEvent.end, reason=str(stop))
         except (AirlensError, DeviceError, OSError) as error:
             self._end(run, GuideEvent.fail, reason=str(error))

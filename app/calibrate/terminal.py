@@ -12,7 +12,7 @@ import typer
 
 from app.calibrate.folder import CalibrationFolder, StepName
 from app.calibrate.guide import GuidedCalibration, LivePlan
-from app.calibrate.pictures import StoppedError
+from app.calibrate.pictures import CalibrationStoppedError
 from app.calibrate.state import line_of
 from app.errors import BadInputError
 from app.experiment.folder import Experiment, open_experiment
@@ -61,7 +61,7 @@ def _session(
             continue
         try:
             issues = guided.take(_tell, stopped)
-        except StoppedError as stop:
+        except CalibrationStoppedError as stop:
             typer.echo(str(stop), err=True)
             return
         for issue in issues:

@@ -46,7 +46,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Watch:
+class BurstWatch:
     """Who follows a burst: hears of every frame, and ends it by saying what becomes of the frames so far.
 
     `begun` hears of the folder of every new capture.
@@ -79,7 +79,7 @@ class TakenBurst:
         )
 
 
-_UNWATCHED = Watch()
+_UNWATCHED = BurstWatch()
 
 
 def take(
@@ -87,7 +87,7 @@ def take(
     experiment: Experiment,
     plan: CapturePlan,
     told: Conditions = UNTOLD,
-    watch: Watch = _UNWATCHED,
+    watch: BurstWatch = _UNWATCHED,
     *,
     sequence: dict[str, Any] | None = None,
     name: str | None = None,
@@ -125,7 +125,7 @@ def take_order(
     camera: Camera,
     experiment: Experiment,
     order: Order,
-    watch: Watch = _UNWATCHED,
+    watch: BurstWatch = _UNWATCHED,
     name: str | None = None,
 ) -> list[TakenBurst]:
     """Take every burst of an order, the first by `name`; fewer when it is stopped.
@@ -148,13 +148,15 @@ def take_order(
     return taken
 
 
-def shoot(camera: Camera, where: Path, plan: CapturePlan, watch: Watch = _UNWATCHED) -> Burst:
+def shoot(camera: Camera, where: Path, plan: CapturePlan, watch: BurstWatch = _UNWATCHED) -> Burst:
     """Take a burst that becomes no capture. Raises AirlensError without room for it at `where`, DeviceError."""
     check_room(where, plan, camera.info)
     return _run(camera, plan, watch, lambda taken: None, None)
 
 
-def _run(camera: Camera, plan: CapturePlan, watch: Watch, keep: OnFrame, rig_on_s: float | None) -> Burst:
+def _run(
+    camera: Camera, plan: CapturePlan, watch: BurstWatch, keep: OnFrame, rig_on_s: float | None
+) -> Burst:
     def follow(taken: Taken) -> None:
         keep(taken)
         if watch.frame is not None:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from app.capture.burst import TakenBurst, Watch, take
+from app.capture.burst import BurstWatch, TakenBurst, take
 from app.capture.files import PictureFiles, picture_files
 from app.errors import AirlensError, BadInputError
 from app.experiment.folder import Experiment
@@ -12,7 +12,7 @@ from drivers.burst import CapturePlan, CaptureRole
 from drivers.verdict import Verdict
 
 ROLES: tuple[CaptureRole, ...] = ("dark", "flat", "reference", "flow")
-_UNWATCHED = Watch()
+_UNWATCHED = BurstWatch()
 
 
 def import_pictures(
@@ -20,7 +20,7 @@ def import_pictures(
     names: Mapping[CaptureRole, list[str]],
     bits: int | None = None,
     told: Conditions = UNTOLD,
-    watch: Watch = _UNWATCHED,
+    watch: BurstWatch = _UNWATCHED,
 ) -> list[TakenBurst]:
     """One capture for each role that has pictures: mean, scatter and count of each pixel, and verdicts.
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 
-from app.capture.burst import TakenBurst, Watch, take
+from app.capture.burst import BurstWatch, TakenBurst, take
 from app.errors import AirlensError
 from app.experiment.captures import newest_pair
 from app.experiment.folder import Experiment, new_id
@@ -17,7 +17,7 @@ from drivers.protocols import Camera
 
 # The bursts in their order. `take_series` gives each its place as `series.place` in its manifest.
 PLACES: tuple[CaptureRole, ...] = ("reference", "flow", "reference")
-_UNWATCHED = Watch()
+_UNWATCHED = BurstWatch()
 
 # Opens the camera for the burst at a place of the series.
 Opens = Callable[[CaptureRole, int], AbstractContextManager[Camera]]
@@ -38,7 +38,7 @@ def take_series(
     plan: CapturePlan,
     settle_s: tuple[float, float] = (0.0, 0.0),
     told: Conditions = UNTOLD,
-    watch: Watch = _UNWATCHED,
+    watch: BurstWatch = _UNWATCHED,
     ready: Callable[[CaptureRole, int], object] = lambda role, place: None,
 ) -> Series:
     """Take the three bursts; `settle_s` is waited before the flow, and before the second reference.

@@ -14,13 +14,13 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from app.capture.burst import OnAbort, Order, TakenBurst, Watch, take_order
+from app.capture.burst import BurstWatch, OnAbort, Order, TakenBurst, take_order
 from app.errors import AirlensError
 from app.experiment.captures import release, reserve
 from app.experiment.folder import Experiment, new_id
 from app.rig.live_camera import LiveCamera
 from app.rig.open import AirState, air_of, open_camera
-from app.states import Machine
+from app.states import StateMachine
 from drivers.burst import BurstOutcome, Progress
 from drivers.errors import DeviceBusyError, DeviceError
 from drivers.protocols import Camera
@@ -52,7 +52,7 @@ class CaptureEvent(StrEnum):
 
 
 _S, _E = DeskState, CaptureEvent
-CAPTURE = Machine(
+CAPTURE = StateMachine(
     name="A capture",
     table={
         _S.running: {
@@ -191,7 +191,7 @@ class CaptureDesk:
         self._end(run, event, reason)
 
     def _take(self, run: _Run) -> tuple[CaptureEvent, str]:
-        watch = Watch(
+        watch = BurstWatch(
             self._following(run, self._progress),
             lambda taken: self._live.show(taken.frame),
             lambda: run.stop,

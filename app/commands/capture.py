@@ -75,7 +75,7 @@ def _command(role: "CaptureRole"):
 
 
 def _take(folder: Path, order, on_abort: OnAbort, as_json: bool) -> None:
-    from app.capture.burst import Watch, interruptible, take_order
+    from app.capture.burst import BurstWatch, interruptible, take_order
     from app.experiment.folder import open_experiment
     from app.rig.open import air_of, open_camera
 
@@ -86,7 +86,7 @@ def _take(folder: Path, order, on_abort: OnAbort, as_json: bool) -> None:
         Bar(transient=True) as bar,
     ):
         task = bar.add_task(f"{plan.role} burst", total=plan.frames)
-        watch = Watch(
+        watch = BurstWatch(
             progress=lambda now: bar.update(task, completed=now.done),
             stop=lambda: on_abort if stopped() else None,
         )
@@ -138,7 +138,7 @@ def series(
     """Take reference, flow and reference again, and say how far the camera moved meanwhile."""
     from rich.progress import Progress as Bar
 
-    from app.capture.burst import Watch, interruptible
+    from app.capture.burst import BurstWatch, interruptible
     from app.capture.series import take_series
     from app.experiment.folder import open_experiment
     from app.rig.open import air_of, open_camera
@@ -157,7 +157,7 @@ def series(
 
     with interruptible() as stopped, Bar(transient=True, disable=ask) as bar:
         task = bar.add_task("series", total=frames)
-        watch = Watch(
+        watch = BurstWatch(
             progress=lambda now: bar.update(task, completed=now.done),
             stop=lambda: "keep" if stopped() else None,
         )

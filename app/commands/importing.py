@@ -31,7 +31,7 @@ def bring(
     """Make captures of pictures that another camera took: TIFF, PNG, JPEG, or a camera's raw files."""
     from rich.progress import Progress as Bar
 
-    from app.capture.burst import Watch
+    from app.capture.burst import BurstWatch
     from app.capture.imported import import_pictures
     from app.commands.capture import said
     from app.experiment.folder import open_experiment
@@ -41,7 +41,7 @@ def bring(
     opened = open_experiment(experiment)
     with Bar(transient=True) as bar:
         task = bar.add_task("pictures", total=None)
-        watch = Watch(progress=lambda now: bar.update(task, completed=now.done, total=now.total))
+        watch = BurstWatch(progress=lambda now: bar.update(task, completed=now.done, total=now.total))
         names: dict[CaptureRole, list[str]] = {
             "reference": reference,
             "flow": flow,

@@ -1,16 +1,17 @@
 """`airlens print pattern` and `airlens print board`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from calibration.board_kind import BoardKind
 
 if TYPE_CHECKING:
     from app.experiment.rig_settings import BoardSettings
 
 PaperName = Annotated[str, typer.Option(help="a4, a3, a2, a1, a0, or the width of a roll, such as 841mm.")]
 Out = Annotated[Path | None, typer.Option(help="PDF to write; by default in the experiment's print/.")]
-BoardKind = Literal["charuco", "chessboard", "circles", "asymmetric-circles"]
 
 
 def register(cli: typer.Typer) -> None:

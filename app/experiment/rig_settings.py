@@ -6,7 +6,8 @@ from pydantic import Field
 
 from app.errors import BadInputError
 from app.files.toml import Strict
-from calibration.board import Board, CharucoBoard, Chessboard, CircleGrid
+from calibration.board import Board, board_of
+from calibration.board_kind import BoardKind
 from calibration.errors import CalibrationError
 
 
@@ -94,7 +95,7 @@ CameraSettings = Annotated[SimulatedCameraSettings | V4l2CameraSettings, Field(d
 class BoardSettings(Strict):
     """The board that the rig is calibrated with: inner corners (chessboard), squares (ChArUco) or circles."""
 
-    kind: Literal["chessboard", "charuco", "circles", "asymmetric-circles"] = "chessboard"
+    kind: BoardKind = "chessboard"
     """What is on the board."""
     columns: Annotated[int, Field(ge=2, le=200)]
     """Inner corners, ChArUco squares, or circles in a row."""
@@ -110,13 +111,7 @@ class BoardSettings(Strict):
     def board(self) -> Board:
         """The board. Raises BadInputError for a combination that cannot be."""
         try:
-            if self.kind == "chessboard":
-                return Chessboard(self.columns, self.rows, self.square_m)
-            if self.kind == "charuco":
-                marker_m = self.marker_m or 0.75 * self.square_m
-                return CharucoBoard(self.columns, self.rows, self.square_m, marker_m, self.dictionary)
-            asymmetric = self.kind == "asymmetric-circles"
-            return CircleGrid(self.columns, self.rows, self.square_m, asymmetric)
+            return board_of(self.kind, self.columns, self.rows, self.square_m, self.marker_m, self.dictionary)
         except CalibrationError as error:
             raise BadInputError(str(error)) from error
 

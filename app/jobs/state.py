@@ -3,7 +3,7 @@
 from enum import StrEnum
 
 from app.jobs.errors import JobError
-from app.states import Machine
+from app.states import StateMachine
 
 
 class JobState(StrEnum):
@@ -48,7 +48,7 @@ WAITING = (JobState.queued, JobState.lost)
 FINISHED = (JobState.done, JobState.failed, JobState.cancelled)
 
 _S, _E = JobState, JobEvent
-JOB = Machine(
+JOB = StateMachine(
     name="The job",
     table={
         _S.queued: {_E.begin: _S.running, _E.fail: _S.failed, _E.cancel: _S.cancelled, _E.pause: _S.paused},

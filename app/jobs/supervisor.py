@@ -27,7 +27,7 @@ from app.jobs.state import JobEvent, JobState
 from app.jobs.study import MOST_JOBS, keep_summary
 from app.jobs.troubles import FULL, Troubles
 from app.jobs.waiting import SUPERVISOR_LOCK
-from app.jobs.watch import Watch, launch_of, pause_after
+from app.jobs.watch import JobWatch, launch_of, pause_after
 
 _log = logging.getLogger(__name__)
 
@@ -40,7 +40,7 @@ class Supervisor:
         self._config = config
         self._engine = create_engine(config, ledger.folder) if engine is None else engine
         self._dispatch = Dispatch(ledger)
-        self._watch = Watch(self._dispatch, self._engine, config, ledger.folder)
+        self._watch = JobWatch(self._dispatch, self._engine, config, ledger.folder)
         self._troubles = Troubles(self._dispatch, config.start_limit_s, self._kill)
         self._due_s: dict[tuple[str, int], float] = {}
 

@@ -28,7 +28,7 @@ class _Sign:
     seen_s: float
 
 
-class Watch:
+class JobWatch:
     """Judges active jobs. What it remembers are times alone, which a new one measures afresh.
 
     All of them are monotonic: the wall clock may be set at any moment.

@@ -9,6 +9,7 @@ from app.experiment.folder import Experiment, open_experiment
 from app.experiment.plan import PLAN_FILE, ChoiceLine, MapLine, Plan, PresetLine, SeenLine, ViewLine
 from app.files.durable import write_json
 from app.files.toml import to_plain
+from app.plan.acting import acting_choices
 from app.plan.machine import this_machine
 from app.plan.tradeoff import ExpectedError, expected_error
 from app.reconstruct.presets import REFERENCE, STANDARD
@@ -17,7 +18,6 @@ from core.displacement import resolve_window_px
 from core.known import level_of
 from core.metrics import departure, inner, rms
 from core.plan.choice import Choice
-from core.plan.choices import Resolution, resolve
 from core.plan.cost import Speed, Work, draft_work, grid_work, paper_work, room_work
 from core.plan.expected import ExpectedFlow, expected_flow
 from core.plan.observability import seen
@@ -42,8 +42,8 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
     signals = signals_of(problem, flow)
     on_stage("what the views determine")
     determined = seen(problem, flow, signals)
-    on_stage("resolve the choices")
-    resolution = resolve(problem.scene, flow, signals)
+    on_stage("judge the choices")
+    choices = acting_choices(problem.scene, flow, signals)
     views = [_view_line(problem, n, flow, s) for n, s in enumerate(signals)]
     machine, source = this_machine()
     made = Plan(
@@ -58,7 +58,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
             boundary=determined.boundary,
             both=determined.both,
         ),
-        choices=choice_lines(resolution),
+        choices=[_choice_line(choice) for choice in choices],
         presets=preset_lines(problem, flow, machine.speeds, windows=[windows_of(s) for s in signals]),
         machine=source,
         verdicts=[
@@ -67,7 +67,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
                 for n, (s, view) in enumerate(zip(signals, views, strict=True))
             ),
             blindness(determined),
-            *broken(resolution.choices),
+            *broken(choices),
         ],
     )
     write_json(experiment.folder / PLAN_FILE, to_plain(made))
@@ -83,11 +83,6 @@ def stated_problem(experiment: Experiment) -> Problem:
 def departure_k(flow: ExpectedFlow) -> float:
     """Rms departure of the expected temperature from the mean at each height, as the score takes it."""
     return rms(departure(inner(flow.excess_k)))
-
-
-def choice_lines(resolution: Resolution) -> list[ChoiceLine]:
-    """The choices as they are told."""
-    return [_choice_line(choice) for choice in resolution.choices]
 
 
 def preset_lines(

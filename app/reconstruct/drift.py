@@ -45,7 +45,7 @@ class Exposures:
 
 
 @dataclass(frozen=True)
-class Prior:
+class MotionPrior:
     """What is known of the camera's motion before this pair of pictures is looked at: mean, and one deviation [px].
 
     `source` says where it comes from.
@@ -56,9 +56,9 @@ class Prior:
     source: str
 
 
-def mount(drift_std_px: float) -> Prior:
+def mount(drift_std_px: float) -> MotionPrior:
     """By the mount's stability alone."""
-    return Prior(Similarity(), drift_std_px, f"the mount's stability: {drift_std_px:g} px")
+    return MotionPrior(Similarity(), drift_std_px, f"the mount's stability: {drift_std_px:g} px")
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Agreement:
             "again."
         )
 
-    def at(self, share: float) -> Prior:
+    def at(self, share: float) -> MotionPrior:
         """The motion after a share of the time between the references: a random walk with both ends known."""
         first = Similarity(
             column_px=share * self.drift.column_px,
@@ -95,7 +95,7 @@ class Agreement:
         )
         step_px = float(np.sqrt(np.mean(self.edge_px**2)))
         std_px = max((share * (1 - share)) ** 0.5 * step_px, _LEAST_PX)
-        return Prior(first, std_px, f"two references, {step_px:.3f} px apart: {std_px:.3f} px")
+        return MotionPrior(first, std_px, f"two references, {step_px:.3f} px apart: {std_px:.3f} px")
 
 
 def agreement(before: Exposures, in_room: Mask) -> Agreement:
@@ -111,7 +111,7 @@ def agreement(before: Exposures, in_room: Mask) -> Agreement:
 
 
 def without_known_drift(
-    exposures: Exposures, in_room: Mask, beyond: Mask, prior: Prior
+    exposures: Exposures, in_room: Mask, beyond: Mask, prior: MotionPrior
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     """The shift of every window, the motion that was taken out of it, and a sentence on it.
 
@@ -186,7 +186,7 @@ def _told(drift: Similarity) -> str:
     )
 
 
-def _unknown(drift: Similarity, prior: Prior, unlike: float | None) -> str:
+def _unknown(drift: Similarity, prior: MotionPrior, unlike: float | None) -> str:
     why = "No part of the picture is free of the room's air."
     if unlike is not None:
         why = (

@@ -14,7 +14,7 @@ from enum import StrEnum
 from typing import Any
 
 from app.rig.frame_statistics import LiveFrame, jpeg_of, statistics_of
-from app.states import Machine
+from app.states import StateMachine
 from drivers.errors import (
     DeviceBusyError,
     DeviceError,
@@ -57,7 +57,7 @@ class CameraEvent(StrEnum):
 
 
 _S, _E = CameraState, CameraEvent
-CAMERA = Machine(
+CAMERA = StateMachine(
     name="The camera",
     table={
         _S.closed: {_E.connect: _S.opening, _E.disconnect: _S.closed, _E.give_up: _S.closed},

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float32
 
-from app.rig.stage import Task, board_size_m, pitch_m
+from app.rig.stage import Task, board_size_m
 from calibration.board import Board
 from calibration.guide import WantedView, pose_of
 from calibration.simulated_pictures import Look, Sheet, look
@@ -90,7 +90,7 @@ class PracticeRoom:
 
 def _printed(board: Board, centre_m: np.ndarray, world_from_sheet: np.ndarray) -> Sheet:
     paint = board.draw(PAINT_PX_PER_SQUARE)
-    px_per_m = PAINT_PX_PER_SQUARE / pitch_m(board)
+    px_per_m = PAINT_PX_PER_SQUARE / board.pitch_m
     size_m = np.array(paint.shape[::-1]) / px_per_m
     corner_m = centre_m - world_from_sheet[:, :2] @ (size_m / 2)
     return Sheet(paint, px_per_m, corner_m, world_from_sheet)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from app.errors import AirlensError
-from calibration.board import Board, CircleGrid
+from calibration.board import Board
 from calibration.guide import WantedView
 from drivers.display import PatternDisplay
 from drivers.protocols import Camera
@@ -91,8 +91,3 @@ def board_size_m(board: Board) -> Float[np.ndarray, "2"]:
     """Width and height that the board's points span."""
     points_m = board.points_m[:, :2]
     return points_m.max(axis=0) - points_m.min(axis=0)
-
-
-def pitch_m(board: Board) -> float:
-    """Size of a square, or from circle to circle."""
-    return board.spacing_m if isinstance(board, CircleGrid) else board.square_m

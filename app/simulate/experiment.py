@@ -5,7 +5,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.capture.burst import Watch, take
+from app.capture.burst import BurstWatch, take
 from app.errors import AirlensError, BadInputError
 from app.experiment.folder import ExperimentSettings, create_experiment
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
@@ -78,7 +78,7 @@ def _fill(
 
         on_stage(role, 0, plan.frames)
         with open_camera(experiment, air_of(role)) as opened:
-            taken = take(opened, experiment, plan, watch=Watch(progress))
+            taken = take(opened, experiment, plan, watch=BurstWatch(progress))
         if taken.shortfall:
             raise AirlensError(taken.shortfall)
 

@@ -17,7 +17,7 @@ from core.losses.representation import Span, Spans, points_of, positions
 from core.problem import PlaneData, Problem, SensorData
 from core.scene import Heater, Inlet, Outlet, Patch, Wall
 from core.setting import SettingError
-from core.solve.nondimensional import Frame
+from core.solve.nondimensional import RoomFrame
 
 # Weight of a thermometer's or anemometer's error of one standard deviation; the other losses are means of squares.
 _READING = 0.01
@@ -25,7 +25,7 @@ _READING = 0.01
 _ONLY_READING = 0.1
 
 
-def boundary_loss(problem: Problem, frame: Frame, *, weight: float, points_an_axis: int) -> BoundaryLoss:
+def boundary_loss(problem: Problem, frame: RoomFrame, *, weight: float, points_an_axis: int) -> BoundaryLoss:
     """Rows of planes, inlets, outlets, heaters and walls, on `points_an_axis` points along each wall axis.
 
     The edges of a patch are as sharp as those points. Within a patch the condition of its wall is left out.
@@ -46,7 +46,7 @@ def boundary_loss(problem: Problem, frame: Frame, *, weight: float, points_an_ax
     return BoundaryLoss(tuple(patches), weight)
 
 
-def point_losses(problem: Problem, frame: Frame) -> tuple[PointLoss, ...]:
+def point_losses(problem: Problem, frame: RoomFrame) -> tuple[PointLoss, ...]:
     """Sensors, and one weak row for the constant of p if nothing else fixes it."""
     losses = [_sensors(sensor, frame) for sensor in problem.sensors]
     knows_p = bool(problem.planes) or any(isinstance(item, Outlet) for item in problem.scene.boundary)
@@ -59,7 +59,7 @@ def point_losses(problem: Problem, frame: Frame) -> tuple[PointLoss, ...]:
     return tuple(losses)
 
 
-def level_loss(problem: Problem, frame: Frame, points_an_axis: int) -> MeanLoss | None:
+def level_loss(problem: Problem, frame: RoomFrame, points_an_axis: int) -> MeanLoss | None:
     """The outlets' mean temperatures on walls whose plane is not known; None where there are none."""
     known = {plane.wall for plane in problem.planes}
     outlets = [found for found in measured_outlets(problem.scene) if found[1].patch.wall not in known]
@@ -77,7 +77,7 @@ def level_loss(problem: Problem, frame: Frame, points_an_axis: int) -> MeanLoss 
     return MeanLoss(tuple(points), jnp.array(target, jnp.float32), jnp.array(weight, jnp.float32))
 
 
-def _inwards(spans: Spans, wall: WallName, frame: Frame, n: int) -> Spans:
+def _inwards(spans: Spans, wall: WallName, frame: RoomFrame, n: int) -> Spans:
     """Points half a cell inside the wall. Air that leaves has no thermal layer, so these have its temperature."""
     face = face_of(wall)
     axis = face.axis
@@ -87,7 +87,7 @@ def _inwards(spans: Spans, wall: WallName, frame: Frame, n: int) -> Spans:
     return _triple(moved)
 
 
-def _plane(plane: PlaneData, frame: Frame, n: int) -> KnownValues:
+def _plane(plane: PlaneData, frame: RoomFrame, n: int) -> KnownValues:
     spans, axes = _wall_spans(plane.wall, frame, n)
     room, (first, second) = frame.room, axes
     shape = tuple(span[2] for span in spans)
@@ -120,7 +120,7 @@ def _resolves_layers(problem: Problem) -> bool:
     return problem.scene.flow.transport in ("molecular", "given")
 
 
-def _wall(wall: Wall, held: list[Patch], frame: Frame, n: int, *, resolved: bool) -> list[KnownValues]:
+def _wall(wall: Wall, held: list[Patch], frame: RoomFrame, n: int, *, resolved: bool) -> list[KnownValues]:
     spans, axes = _wall_spans(wall.wall, frame, n)
     shape = tuple(span[2] for span in spans)
     free = ~np.any([_inside(h, spans, axes, frame) for h in held], axis=0) if held else np.ones(shape, bool)
@@ -138,7 +138,7 @@ def _wall(wall: Wall, held: list[Patch], frame: Frame, n: int, *, resolved: bool
     return patches
 
 
-def _insulated(wall: WallName, spans: Spans, free: np.ndarray, frame: Frame, n: int) -> KnownValues:
+def _insulated(wall: WallName, spans: Spans, free: np.ndarray, frame: RoomFrame, n: int) -> KnownValues:
     """No heat through the wall: the temperatures half a spacing inside and outside are equal."""
     axis = face_of(wall).axis
     step = (frame.upper[axis] - frame.lower[axis]) / (n - 1)  # half a cell on either side: see `solve_grid`
@@ -149,7 +149,7 @@ def _insulated(wall: WallName, spans: Spans, free: np.ndarray, frame: Frame, n: 
     return KnownValues(_triple(after), _zeros(free.shape), weight, minus=_triple(before))
 
 
-def _patch(item: Inlet | Outlet | Heater, frame: Frame, n: int) -> KnownValues:
+def _patch(item: Inlet | Outlet | Heater, frame: RoomFrame, n: int) -> KnownValues:
     spans, axes = _wall_spans(item.patch.wall, frame, n)
     shape = tuple(span[2] for span in spans)
     inside = _inside(item.patch, spans, axes, frame)
@@ -177,7 +177,7 @@ def _nothing_inside(item: Inlet | Outlet | Heater, n: int) -> SettingError:
     )
 
 
-def _sensors(sensor: SensorData, frame: Frame) -> PointLoss:
+def _sensors(sensor: SensorData, frame: RoomFrame) -> PointLoss:
     points = (sensor.position_m - np.array(frame.room.lower_m)) / frame.scales.length_m
     t_known, u_known = np.isfinite(sensor.temperature_k), np.isfinite(sensor.velocity_m_s)
     target = frame.scales.to_nd(
@@ -196,7 +196,7 @@ def _sensors(sensor: SensorData, frame: Frame) -> PointLoss:
     return PointLoss(jnp.asarray(points, jnp.float32), target, weight)
 
 
-def _wall_spans(wall: str, frame: Frame, n: int) -> tuple[Spans, tuple[int, int]]:
+def _wall_spans(wall: str, frame: RoomFrame, n: int) -> tuple[Spans, tuple[int, int]]:
     """The wall's points, and its two axes."""
     face = face_of(wall)
     corner = frame.upper if face.upper else frame.lower
@@ -210,7 +210,7 @@ def _triple(spans: list[Span]) -> Spans:
     return x, y, z
 
 
-def _inside(patch: Patch, spans: Spans, axes: tuple[int, int], frame: Frame) -> np.ndarray:
+def _inside(patch: Patch, spans: Spans, axes: tuple[int, int], frame: RoomFrame) -> np.ndarray:
     inside = np.ones(tuple(span[2] for span in spans), bool)
     for axis, low, high in zip(axes, patch.lower_m, patch.upper_m, strict=True):
         metres = frame.room.lower_m[axis] + frame.scales.length_m * positions(spans[axis])
@@ -220,7 +220,7 @@ def _inside(patch: Patch, spans: Spans, axes: tuple[int, int], frame: Frame) -> 
 
 
 def _values(
-    shape: tuple[int, ...], frame: Frame, temperature_k: float, velocity_m_s: tuple = (0.0, 0.0, 0.0)
+    shape: tuple[int, ...], frame: RoomFrame, temperature_k: float, velocity_m_s: tuple = (0.0, 0.0, 0.0)
 ) -> FlowValues:
     flow = frame.scales.to_nd(
         jnp.full(shape, temperature_k, jnp.float32),

@@ -19,7 +19,7 @@ _EFFECTIVE_REYNOLDS = 1600.0
 _EFFECTIVE_PECLET = 1400.0
 
 
-class Frame(NamedTuple):
+class RoomFrame(NamedTuple):
     """Nondimensional coordinates are (x − lower corner) / length."""
 
     room: Box
@@ -34,7 +34,7 @@ class Frame(NamedTuple):
         return x, y, z
 
 
-def frame_of(problem: Problem) -> Frame:
+def frame_of(problem: Problem) -> RoomFrame:
     """Scales from the largest known speed and excess temperature; length is the room's height."""
     scene = problem.scene
     ambient = scene.air.ambient_temperature_k
@@ -59,10 +59,10 @@ def frame_of(problem: Problem) -> Frame:
         length_m=room.size_m[2], speed_m_s=max(speeds), excess_k=max(excess, key=abs), air=scene.air
     )
     x, y, z = (size / found.length_m for size in room.size_m)
-    return Frame(room, found, _numbers(scene.flow, problem, found), (x, y, z))
+    return RoomFrame(room, found, _numbers(scene.flow, problem, found), (x, y, z))
 
 
-def height_profile(problem: Problem, frame: Frame, spans: Spans) -> FlowValues:
+def height_profile(problem: Problem, frame: RoomFrame, spans: Spans) -> FlowValues:
     """T and p of an upright column of air, carried through the room.
 
     Of a known plane across x or y: the median over y. Without a plane the temperature of the air that leaves,
@@ -91,13 +91,13 @@ def height_profile(problem: Problem, frame: Frame, spans: Spans) -> FlowValues:
     )
 
 
-def outlet_height(problem: Problem, frame: Frame) -> float:
+def outlet_height(problem: Problem, frame: RoomFrame) -> float:
     """Where p is zero: the mean height of the outlets' middles, nondimensional; the floor without any."""
     outlets = [item for item in problem.scene.boundary if isinstance(item, Outlet)]
     return float(np.mean([_height(outlet, frame) for outlet in outlets])) if outlets else frame.lower[2]
 
 
-def _height(outlet: Outlet, frame: Frame) -> float:
+def _height(outlet: Outlet, frame: RoomFrame) -> float:
     """Of the patch's middle, where p is zero: nondimensional."""
     room, patch = frame.room, outlet.patch
     face = face_of(patch.wall)

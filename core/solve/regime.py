@@ -19,7 +19,7 @@ from core.rays.operator import build
 from core.rays.visibility import away_from_walls
 from core.scene import Scene
 from core.setting import SettingError, setting
-from core.solve.nondimensional import Frame, height_profile
+from core.solve.nondimensional import RoomFrame, height_profile
 
 Regime = Literal["bos+boundary", "pde+boundary", "bos+pde+boundary"]
 # Prior slopes of T across and along the view.
@@ -61,7 +61,7 @@ class DataModel:
 
 def losses_of(
     problem: Problem,
-    frame: Frame,
+    frame: RoomFrame,
     regime: str,
     weights: Weights,
     data: DataModel,
@@ -98,7 +98,9 @@ def losses_of(
     return tuple(losses)
 
 
-def _smoothness(problem: Problem, frame: Frame, weight: float, shape: tuple[int, int, int]) -> SmoothnessLoss:
+def _smoothness(
+    problem: Problem, frame: RoomFrame, weight: float, shape: tuple[int, int, int]
+) -> SmoothnessLoss:
     spans = frame.vertices(shape)
     per_nd = frame.scales.length_m / abs(frame.scales.excess_k)
     across, along = _ACROSS_K_M * per_nd, _ALONG_K_M * per_nd
@@ -108,7 +110,7 @@ def _smoothness(problem: Problem, frame: Frame, weight: float, shape: tuple[int,
 
 
 def image_loss(
-    problem: Problem, frame: Frame, weight: float, data: DataModel, shape: tuple[int, int, int]
+    problem: Problem, frame: RoomFrame, weight: float, data: DataModel, shape: tuple[int, int, int]
 ) -> ShiftLoss:
     """The data term of every view, as the scene names it; `auto` takes the windows' displacements."""
     scene = problem.scene
@@ -124,7 +126,7 @@ def image_loss(
     return ShiftLoss(tuple(views), frame.vertices(shape), frame.scales, scene.air, weight)
 
 
-def traced_loss(problem: Problem, frame: Frame, weight: float, data: DataModel, steps: int) -> TracedLoss:
+def traced_loss(problem: Problem, frame: RoomFrame, weight: float, data: DataModel, steps: int) -> TracedLoss:
     """The paper's data term of every view: rendered where there are samples, else the windows' shifts."""
     scene = problem.scene
     if scene.solve.data_term == "rendered":

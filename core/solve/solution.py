@@ -8,13 +8,13 @@ import numpy as np
 from core.losses.boussinesq import FlowValues
 from core.losses.representation import Spans, Unknowns, positions
 from core.result import Outcome, Solution
-from core.solve.nondimensional import Frame
+from core.solve.nondimensional import RoomFrame
 from core.watch import Row
 
 
 def solution_of(
     unknowns: Unknowns,
-    frame: Frame,
+    frame: RoomFrame,
     shape: tuple[int, int, int],
     outcome: Outcome,
     solver_s: float,
@@ -47,7 +47,7 @@ def _evaluate(unknowns: Unknowns, spans: Spans) -> FlowValues:
     return unknowns.representation.fields().on_grid(spans)
 
 
-def _learned(unknowns: Unknowns, frame: Frame) -> tuple[str, ...]:
+def _learned(unknowns: Unknowns, frame: RoomFrame) -> tuple[str, ...]:
     """Re, Pe and the drift that were used or found."""
     numbers, notes = frame.numbers, []
     if unknowns.log_transport is not None:

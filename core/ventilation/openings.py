@@ -28,7 +28,7 @@ class Passage(eqx.Module):
     temperature_k: float
 
 
-class Exchange(eqx.Module):
+class AirExchange(eqx.Module):
     """All that passes the walls. `heat_w` is what the air brings beyond the exhaust's temperature."""
 
     passages: tuple[Passage, ...]
@@ -43,7 +43,7 @@ def opening_patches(scene: Scene) -> tuple[Patch, ...]:
     return tuple(part.patch for part in scene.boundary if isinstance(part, Inlet | Outlet))
 
 
-def exchange(flow: FaceFlow, temperature_k: Vertices, scene: Scene) -> Exchange:
+def exchange(flow: FaceFlow, temperature_k: Vertices, scene: Scene) -> AirExchange:
     """What the walls let through. `temperature_k` is on the vertices that `flow` lies between.
 
     Where the scene states no opening, a wall with flow is one for the air that enters, and one for what leaves.
@@ -53,7 +53,7 @@ def exchange(flow: FaceFlow, temperature_k: Vertices, scene: Scene) -> Exchange:
     )
     supply_k, exhaust_k = (_mean_k(passages, sign) for sign in (1.0, -1.0))
     heat_w = heat_capacity_j_m3_k(scene.air) * flow.entering_m3_s * (supply_k - exhaust_k)
-    return Exchange(passages, flow.entering_m3_s, supply_k, exhaust_k, heat_w)
+    return AirExchange(passages, flow.entering_m3_s, supply_k, exhaust_k, heat_w)
 
 
 def heat_capacity_j_m3_k(air: Air) -> float:

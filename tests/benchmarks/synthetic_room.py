@@ -21,7 +21,7 @@ from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.scene import FixedTexture, FlowModel, PlaneField, Scene, View, Wall
 from core.solve.grid.grid import GridSettings, solve_grid
-from core.solve.nondimensional import Frame, frame_of
+from core.solve.nondimensional import RoomFrame, frame_of
 from core.solve.regime import DataModel
 from tests.benchmarks.options import whole_numbers
 
@@ -50,7 +50,7 @@ def room_scene(reynolds: float) -> Scene:
     )
 
 
-def settled(grid: StaggeredGrid, frame: Frame, steps: int) -> Staggered:
+def settled(grid: StaggeredGrid, frame: RoomFrame, steps: int) -> Staggered:
     """The steady state; from that of half the cells where there are more than 32, which takes fewer steps."""
     if grid.cells[0] <= 32:
         return march(grid, frame, grid.zeros(), steps)
@@ -58,7 +58,7 @@ def settled(grid: StaggeredGrid, frame: Frame, steps: int) -> Staggered:
     return march(grid, frame, prolong(settled(coarse, frame, steps), coarse, grid), steps // 2)
 
 
-def march(grid: StaggeredGrid, frame: Frame, start: Staggered, steps: int) -> Staggered:
+def march(grid: StaggeredGrid, frame: RoomFrame, start: Staggered, steps: int) -> Staggered:
     """The steady state by artificial compressibility: velocity and T from the residuals, then pressure."""
     n = grid.cells[0]
     centres = (np.arange(n) + 0.5) / n
@@ -150,7 +150,7 @@ def _centres() -> np.ndarray:
     return np.stack([column.ravel(), row.ravel()], axis=1)
 
 
-def errors(found, truth: Staggered, grid: StaggeredGrid, frame: Frame) -> dict[str, float]:
+def errors(found, truth: Staggered, grid: StaggeredGrid, frame: RoomFrame) -> dict[str, float]:
     """Relative errors of T - T0 and u over the vertices of the result."""
     axes = tuple(
         (a - low) / frame.scales.length_m

@@ -1,10 +1,10 @@
-"""SIGTERM and SIGKILL to a job at random moments: how soon it is gone, and that it goes on to the same bits.
+"""SIGTERM and SIGKILL to a job at random moments of its solve: how soon it is gone, and if its bits are the same.
 
     python -m tests.benchmarks.terminate EXPERIMENT --preset standard --times 10
 
-A real worker on an experiment (made by `airlens simulate`). It runs undisturbed, then with a signal at a random
-moment of that time, begun anew after each. One JSON line a signal, and one at the end. `--cells` makes a room's grids
-smaller where 48^3 would take too long, and sets the cells of `grid`.
+A real worker on an experiment (made by `airlens simulate`). It runs undisturbed; then it is killed at random shares
+of its solver's work, and begun anew after each. One JSON line a signal, with what the solver said last, and one at
+the end. `--cells` makes a room's grids smaller where 48^3 would take too long, and sets the cells of `grid`.
 """
 
 import argparse
@@ -20,11 +20,13 @@ import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 from app import worker
 from app.experiment.results import read_result
-from app.jobs import JobSpec, Ledger
+from app.jobs import JobSpec, Ledger, worker_status
 from app.jobs.folder import JobFolder, Owner
+from app.jobs.told import whole_lines
 from app.reconstruct import presets
 from core.result import Solution
 from core.solve.room import solve_room
@@ -56,14 +58,19 @@ class Runs:
             stderr=subprocess.DEVNULL,
         )
 
-    def doing(self) -> str:
-        """What it said last that it does."""
-        try:
-            lines = (self.folder.attempt(self.number) / "events.jsonl").read_text().splitlines()
-        except FileNotFoundError:
-            return "start"
-        told = [json.loads(line) for line in lines]
-        return next((e["body"]["stage"] for e in reversed(told) if e["kind"] == "stage"), "start")
+    def told(self) -> tuple[str, float]:
+        """What it said last that it does, and the largest share of its solve that it has told."""
+        lines, _ = whole_lines(self.folder.attempt(self.number) / "events.jsonl", 0)
+        events = [json.loads(line) for line in lines]
+        doing = next((e["body"]["stage"] for e in reversed(events) if e["kind"] == "stage"), "start")
+        counted = [e["body"] for e in events if e["kind"] == "progress" and e["body"]["steps"]]
+        return doing, max((body["step"] / body["steps"] for body in counted), default=0.0)
+
+    def ends(self) -> None:
+        """Run an attempt to its end. Raises RuntimeError where it fails."""
+        with self.begin() as process:
+            if process.wait() != worker_status.DONE:
+                raise RuntimeError(f"The worker ended with status {process.returncode}.")
 
     def bits(self) -> bytes:
         """The result's fields."""
@@ -72,7 +79,7 @@ class Runs:
         return b"".join(b"" if field is None else field.tobytes() for field in fields)
 
 
-def work(folder: str, cells: int) -> int:
+def work(folder: str, cells: int) -> NoReturn:
     """Be the worker, with a smaller room."""
     if cells:
         small = replace(presets.STANDARD, cells=cells, coarse_cells=cells * 2 // 3, vertices=cells + 1)
@@ -81,22 +88,63 @@ def work(folder: str, cells: int) -> int:
             return solve_room(problem, small, watch)
 
         presets.PRESETS = {**presets.PRESETS, "standard": solve}
-    return worker.main([folder])
+    worker.end(worker.main([folder]))
 
 
-def disturbed(runs: Runs, number: signal.Signals, after_s: float) -> dict[str, object] | None:
-    """One attempt with a signal after so long; None where it ended before."""
+def disturbed(runs: Runs, number: signal.Signals, share: float, later_s: float) -> dict[str, object] | None:
+    """One attempt with a signal so long after it told so much; None where it ended before."""
     with runs.begin() as process:
+        while runs.told()[1] < share and process.poll() is None:
+            time.sleep(0.02)
         try:
-            process.wait(after_s)
+            process.wait(later_s)
             return None
         except subprocess.TimeoutExpired:
-            doing, sent_s = runs.doing(), time.perf_counter()
+            doing, told = runs.told()
+            sent_s = time.perf_counter()
         process.send_signal(number)
         process.wait(120)
     gone_s = time.perf_counter() - sent_s
-    row = {"signal": number.name, "after_s": round(after_s, 1), "doing": doing}
+    row = {"signal": number.name, "share": round(told, 3), "doing": doing}
     return {**row, "exit": process.returncode, "gone_s": round(gone_s, 2)}
+
+
+def copied(experiment: Path, folder: Path, cells: int) -> Path:
+    """The experiment without its results, at another grid."""
+    copy = folder / "experiment"
+    shutil.copytree(experiment, copy, ignore=shutil.ignore_patterns("results"))
+    if cells:
+        settings = copy / "experiment.toml"
+        settings.write_text(re.sub(r"grid = .*", f"grid = {cells}", settings.read_text()))
+    return copy
+
+
+def measured(options: argparse.Namespace, folder: Path) -> None:
+    """Print the rows."""
+    experiment = copied(options.experiment, folder, options.cells)
+    point = {"preset": options.preset, "cells": options.cells or None}
+
+    def say(**row: object) -> None:
+        print(json.dumps({**point, **row}), flush=True)
+
+    whole = Runs(folder, experiment, options.preset, options.cells)
+    began_s = time.perf_counter()
+    whole.ends()
+    say(whole_s=round(time.perf_counter() - began_s, 1), load=os.getloadavg()[0])
+    chance = random.Random(options.seed)
+    # A solver's estimate of its own work may be too large: the moments lie in what it really told.
+    shares = sorted(chance.uniform(0.0, whole.told()[1]) for _ in range(options.times))
+    runs = Runs(folder, experiment, options.preset, options.cells)
+    gone = []
+    for n, share in enumerate(shares):
+        row = disturbed(runs, _SIGNALS[n % 2], share, chance.uniform(0.0, 1.0))
+        if row is None:
+            break
+        gone.append(row["gone_s"])
+        say(**row)
+    else:
+        runs.ends()
+    say(signals=len(gone), gone_s_worst=max(gone, default=None), same_bits=runs.bits() == whole.bits())
 
 
 def main() -> int:
@@ -110,39 +158,9 @@ def main() -> int:
     parser.add_argument("--work", help="be the worker of this job's folder")
     options = parser.parse_args()
     if options.work:
-        return work(options.work, options.cells)
+        work(options.work, options.cells)
     with tempfile.TemporaryDirectory() as scratch:
-        experiment = Path(scratch) / "experiment"
-        shutil.copytree(options.experiment, experiment, ignore=shutil.ignore_patterns("results"))
-        settings = experiment / "experiment.toml"
-        if options.cells:
-            settings.write_text(re.sub(r"grid = .*", f"grid = {options.cells}", settings.read_text()))
-        point = {"preset": options.preset, "cells": options.cells or None}
-        # Twice: what the first compiles the second need not.
-        for _ in range(2):
-            whole = Runs(Path(scratch), experiment, options.preset, options.cells)
-            began_s = time.perf_counter()
-            with whole.begin() as process:
-                process.wait()
-            whole_s = time.perf_counter() - began_s
-        print(json.dumps({**point, "whole_s": round(whole_s, 1), "load": os.getloadavg()[0]}), flush=True)
-        chance, runs = (
-            random.Random(options.seed),
-            Runs(Path(scratch), experiment, options.preset, options.cells),
-        )
-        gone, ended = [], False
-        for n in range(options.times):
-            row = disturbed(runs, _SIGNALS[n % 2], chance.uniform(0.05, 0.9) * whole_s)
-            ended = row is None
-            if row is None:
-                break
-            gone.append(row["gone_s"])
-            print(json.dumps({**point, **row}), flush=True)
-        if not ended:
-            with runs.begin() as process:
-                process.wait()
-        same = runs.bits() == whole.bits()
-        print(json.dumps({**point, "signals": len(gone), "gone_s_worst": max(gone), "same_bits": same}))
+        measured(options, Path(scratch))
     return 0
 
 

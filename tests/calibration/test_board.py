@@ -1,7 +1,10 @@
+from typing import get_args
+
 import numpy as np
 import pytest
 
-from calibration.board import CharucoBoard, Chessboard, CircleGrid
+from calibration.board import CharucoBoard, Chessboard, CircleGrid, board_of
+from calibration.board_kind import BoardKind
 from calibration.errors import CalibrationError
 from calibration.simulated_pictures import look
 from calibration.views import view_of
@@ -59,3 +62,23 @@ def test_impossible_boards_are_refused():
         CharucoBoard(9, 7, 0.05, 0.06)
     with pytest.raises(CalibrationError, match="Unknown marker dictionary"):
         CharucoBoard(9, 7, 0.05, 0.04, "DICT_NONE")
+
+
+@pytest.mark.parametrize("kind", get_args(BoardKind))
+def test_every_kind_that_has_a_name_is_found_in_its_own_print(kind: BoardKind):
+    board = board_of(kind, 7, 6, 0.03, None, "DICT_5X5_250")
+
+    seen = board.detect(board.draw(40))
+
+    assert seen is not None
+    np.testing.assert_array_equal(np.sort(seen.ids), np.arange(len(board.points_m)))
+    # Which corner is the first one the detector may choose: what is held is how far apart neighbours are.
+    np.testing.assert_allclose(
+        nearest(seen.pixels_px), nearest(board.points_m) / board.pitch_m * 40, rtol=0.02
+    )
+
+
+def nearest(points: np.ndarray) -> np.ndarray:
+    """Every point's distance to its nearest neighbour, the smallest first."""
+    apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    return np.sort(np.where(apart > 0, apart, np.inf).min(axis=1))

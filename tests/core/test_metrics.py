@@ -49,3 +49,13 @@ def test_still_air_scores_one_and_the_jet_is_scored_apart():
 def test_pressure_is_known_up_to_a_constant():
     p = np.random.default_rng(1).standard_normal((5, 7, 6))
     assert score_pressure(p + 3.0, p)["rel"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_trivial_pressure_is_the_first_planes_carried_along_x():
+    p = np.random.default_rng(2).standard_normal((5, 7, 6))
+    carried = np.broadcast_to(p[:1], p.shape)
+    expected = score_pressure(carried, p)["rel"]
+    assert expected > 0.1
+    assert score_pressure(p, p)["trivial"]["inlet_plane"] == pytest.approx(expected)
+    # A room whose pressure does not change along x is that plane.
+    assert score_pressure(carried, carried)["trivial"]["inlet_plane"] == pytest.approx(0.0, abs=1e-12)

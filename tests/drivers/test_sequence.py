@@ -32,6 +32,7 @@ def test_an_abort_ends_the_waiting():
 
 def test_times_that_cannot_be_kept_are_refused_before():
     check_times(evenly(3, 5.0), 4.0)
+    check_times(evenly(3, 5.0), 5.0)  # one after the other without a pause
     with pytest.raises(DeviceSettingError, match="takes 6 s"):
         check_times(evenly(3, 5.0), 6.0)
     with pytest.raises(DeviceSettingError, match="must rise"):

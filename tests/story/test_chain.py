@@ -22,7 +22,7 @@ from app.report.export import export
 from app.simulate.experiment import simulate
 from app.volume.score import score_experiment
 from core.displacement import standard_deviation_px
-from tests.story.conftest import ROOM
+from tests.rooms import ROOM
 
 
 def test_the_temperature_beats_the_inlet_plane_carried_through_the_room(done, experiment):

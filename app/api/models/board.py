@@ -1,16 +1,15 @@
 """The board that a rig is calibrated with, as it crosses the API."""
 
-from typing import Literal
-
 from pydantic import Field
 
 from app.api.models.strict import Strict
+from calibration.board_kind import BoardKind
 
 
 class BoardGeometry(Strict):
     """A board: inner corners of a chessboard, squares of a ChArUco board, circles."""
 
-    kind: Literal["chessboard", "charuco", "circles", "asymmetric-circles"] = "chessboard"
+    kind: BoardKind = "chessboard"
     columns: int = Field(ge=2, le=200)
     rows: int = Field(ge=2, le=200)
     square_m: float = Field(gt=0, le=10)

@@ -26,7 +26,7 @@ _BURST_S = 0.5
 _compiled = eqx.filter_jit(compiler_options={"xla_backend_optimization_level": 1})  # pyright: ignore
 
 
-class Step(eqx.Module):
+class NewtonStep(eqx.Module):
     """One Gauss-Newton step: the new unknowns, half the squared residual before and after, CG's work."""
 
     unknowns: PyTree
@@ -56,7 +56,7 @@ def gauss_newton_step(
     *,
     scale: PyTree | None = None,
     should_stop: Callable[[], bool] = lambda: False,
-) -> Step | None:
+) -> NewtonStep | None:
     """Linearise `residual(unknowns, data)`, solve for a step, and say what it would cost.
 
     Whether to take it is the caller's: `cost_after` may be above `cost_before`. None where `should_stop`
@@ -73,7 +73,7 @@ def gauss_newton_step(
         if int(search.used) >= cg_iterations or int(search.used) < int(until):
             moved = jax.tree.map(lambda z, s, y: z + s * y, unknowns, scale, search.y)
             before_cost = half_square(residual, unknowns, data)
-            return Step(moved, before_cost, half_square(residual, moved, data), search.used)
+            return NewtonStep(moved, before_cost, half_square(residual, moved, data), search.used)
         if before > 0:  # the first burst compiles
             burst = max(1, min(20, int(burst * _BURST_S / (time.perf_counter() - began))))
     return None

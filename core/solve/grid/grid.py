@@ -23,9 +23,9 @@ from core.problem import Problem
 from core.result import Outcome, Solution
 from core.setting import SettingError, setting
 from core.solve.check import check_problem
-from core.solve.grid.gauss_newton import Step, column_scale, gauss_newton_step
+from core.solve.grid.gauss_newton import NewtonStep, column_scale, gauss_newton_step
 from core.solve.grid.start import starting_flow
-from core.solve.nondimensional import Frame, frame_of
+from core.solve.nondimensional import RoomFrame, frame_of
 from core.solve.regime import DataModel, Regime, Weights, losses_of, moved
 from core.solve.solution import solution_of
 from core.watch import Row, StoppedError, Store, Watch
@@ -111,7 +111,7 @@ def solve_grid(
     return solution_of(state.unknowns, frame, shape, outcome, clock.elapsed_s, history)
 
 
-def initial_unknowns(problem: Problem, frame: Frame, settings: GridSettings) -> Unknowns:
+def initial_unknowns(problem: Problem, frame: RoomFrame, settings: GridSettings) -> Unknowns:
     """Still air in balance, as warm as what is known, on the coarsest grid."""
     grid = StaggeredGrid(frame.lower, frame.upper, _cubic(settings.coarsest))
     multigrid = zero_multigrid(grid)
@@ -171,7 +171,7 @@ def _descend(
     return state, outcome
 
 
-def _judged(state: GridState, step: Step, settings: GridSettings) -> tuple[GridState, Outcome]:
+def _judged(state: GridState, step: NewtonStep, settings: GridSettings) -> tuple[GridState, Outcome]:
     """The state after a step, which is taken where it lowers the cost, and how the level would end here."""
     before, after, number = float(step.cost_before), float(step.cost_after), int(state.step) + 1
     if after < before:
@@ -200,7 +200,7 @@ def _others(unknowns: Unknowns) -> tuple[Array | None, Array | None]:
     return unknowns.drift, unknowns.log_transport
 
 
-def _record(step: Step, state: GridState, elapsed_s: float, settings: GridSettings) -> Row:
+def _record(step: NewtonStep, state: GridState, elapsed_s: float, settings: GridSettings) -> Row:
     cells, number = _multigrid(state.unknowns).finest.cells[0], int(state.step) + 1
     return {
         "doing": "descend on the grid",
@@ -252,7 +252,9 @@ class _Keeper:
             claim(store, configuration)
         self._last, self._cost_s = time.perf_counter(), 0.0
 
-    def resumed(self, problem: Problem, frame: Frame, settings: GridSettings) -> tuple[GridState, list[Row]]:
+    def resumed(
+        self, problem: Problem, frame: RoomFrame, settings: GridSettings
+    ) -> tuple[GridState, list[Row]]:
         """The newest checkpoint's state and history, or the start's."""
         state = _at_start(initial_unknowns(problem, frame, settings), settings)
         found = newest(self._store) if self._store is not None else None

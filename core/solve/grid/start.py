@@ -18,13 +18,13 @@ from core.problem import Problem
 from core.scene import SolveModel
 from core.solve.draft.draft import solve_draft
 from core.solve.draft.temperature_prior import TemperatureSettings, known_air_k
-from core.solve.nondimensional import Frame, height_profile, outlet_height
+from core.solve.nondimensional import RoomFrame, height_profile, outlet_height
 
 # Enough to resolve a profile, in a second.
 _DRAFT_CELLS = 24
 
 
-def starting_flow(problem: Problem, frame: Frame, spans: Spans, regime: str) -> FlowValues:
+def starting_flow(problem: Problem, frame: RoomFrame, spans: Spans, regime: str) -> FlowValues:
     """The known plane's profile; without one `draft`'s temperature where the regime uses images."""
     if problem.planes or not problem.shifts or "bos" not in regime or not known_air_k(problem):
         return height_profile(problem, frame, spans)
@@ -50,7 +50,7 @@ def starting_flow(problem: Problem, frame: Frame, spans: Spans, regime: str) -> 
 
 
 def _column(
-    profile: Float[np.ndarray, " nz"], z: Float[np.ndarray, " nz"], problem: Problem, frame: Frame
+    profile: Float[np.ndarray, " nz"], z: Float[np.ndarray, " nz"], problem: Problem, frame: RoomFrame
 ) -> Float[np.ndarray, " nz"]:
     """The integral of the profile from the outlets' height, where p is zero."""
     whole = cumulative_trapezoid(profile, z, initial=0.0)

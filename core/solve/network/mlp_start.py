@@ -11,12 +11,12 @@ from core.losses.representation import points_of
 from core.mlp import Mlp
 from core.result import Solution
 from core.setting import SettingError
-from core.solve.nondimensional import Frame
+from core.solve.nondimensional import RoomFrame
 
 _POINTS, _RATE = 4096, 5e-3
 
 
-def network_like(network: Mlp, solution: Solution, frame: Frame, *, steps: int, seed: int) -> Mlp:
+def network_like(network: Mlp, solution: Solution, frame: RoomFrame, *, steps: int, seed: int) -> Mlp:
     """`network` fitted to a solution's T, p and u at its vertices, `steps` mini-batches by Adam.
 
     Raises SettingError for a solution without p and u.

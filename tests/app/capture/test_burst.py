@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from app.capture.burst import Order, Watch, interruptible, take, take_order
+from app.capture.burst import BurstWatch, Order, interruptible, take, take_order
 from app.experiment.captures import load_capture
 from app.experiment.folder import ExperimentSettings, create_experiment
 from app.rig.frame_report import judge_frame, write_picture
@@ -44,7 +44,7 @@ def test_an_aborted_burst_is_kept_or_discarded_as_said(experiment):
     for on_abort in ("keep", "discard"):
         done = []
         plan = CapturePlan(role="flow", frames=50)
-        watch = Watch(done.append, stop=lambda n=done, on=on_abort: on if len(n) >= 3 else None)
+        watch = BurstWatch(done.append, stop=lambda n=done, on=on_abort: on if len(n) >= 3 else None)
         taken = take(make_camera(), experiment, plan, watch=watch)
         assert "3 of 50 frames" in taken.shortfall
         assert taken.burst.outcome is BurstOutcome.ABORTED
@@ -58,7 +58,7 @@ def test_a_sequence_is_one_capture_a_burst_with_its_times(experiment):
     camera = make_camera(clock=SystemClock(), frame_rate_hz=200.0, exposure_s=0.004)
     plan = CapturePlan(role="flow", frames=3, settle_frames=0)
     begun = []
-    taken = take_order(camera, experiment, Order(plan, 2, 0.5), Watch(begun=begun.append), "first")
+    taken = take_order(camera, experiment, Order(plan, 2, 0.5), BurstWatch(begun=begun.append), "first")
     assert [one.folder for one in taken] == begun
     assert begun[0].name == "first"
     times = [load_capture(one.folder).manifest["origin"]["sequence"] for one in taken]
@@ -81,7 +81,7 @@ def test_what_fails_before_the_first_frame_leaves_nothing_and_after_it_what_was_
             raise OSError("No space left on device")
 
     with pytest.raises(OSError, match="No space left"):
-        take(make_camera(), experiment, CapturePlan(frames=4), watch=Watch(frame=full))
+        take(make_camera(), experiment, CapturePlan(frames=4), watch=BurstWatch(frame=full))
     (left,) = experiment.captures_folder.iterdir()
     assert not load_capture(left).complete
 

@@ -1,29 +1,16 @@
 import threading
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from app import worker
-from app.cli import create_cli
 from app.errors import BadInputError
 from app.experiment.results import read_result
 from app.jobs import JobSpec, Ledger
 from app.jobs.attempt import PLANE_FILE, AttemptStoppedError
 from app.jobs.folder import JobFolder, Owner
 from app.pipeline import reconstruct
-
-
-@pytest.fixture(scope="module")
-def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("rig") / "experiment"
-    with (files("app.simulate.sample") / "room.npz").open() as truth:
-        options = ["--truth", truth.name, "--camera-px", "160", "--frames", "2"]
-    done = CliRunner().invoke(create_cli(), ["simulate", str(folder), *options], catch_exceptions=False)
-    assert done.exit_code == 0
-    return folder
 
 
 def begun(ledger: Ledger, experiment: Path) -> tuple[JobFolder, Owner]:

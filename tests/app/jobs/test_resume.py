@@ -5,13 +5,8 @@ import signal
 import subprocess
 import sys
 import time
-from importlib.resources import files
 from pathlib import Path
 
-import pytest
-from typer.testing import CliRunner
-
-from app.cli import create_cli
 from app.experiment.results import read_result
 from app.jobs import JobSpec, Ledger
 from app.jobs.folder import JobFolder, Owner
@@ -19,19 +14,6 @@ from app.jobs.worker_status import DONE
 from core.checkpoint import decode
 
 ROOT = Path(__file__).parents[3]
-
-
-@pytest.fixture(scope="module")
-def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("rig") / "experiment"
-    with (files("app.simulate.sample") / "room.npz").open() as truth:
-        options = ["--truth", truth.name, "--camera-px", "160", "--frames", "2"]
-    CliRunner().invoke(create_cli(), ["simulate", str(folder), *options], catch_exceptions=False)
-    settings = folder / "experiment.toml"
-    text = settings.read_text()
-    assert text.count('grid = "auto"') == 1
-    settings.write_text(text.replace('grid = "auto"', "grid = 8"))
-    return folder
 
 
 class Attempts:

@@ -6,7 +6,7 @@ import pytest
 from core.geometry import Box, looking_along_y
 from core.problem import PlaneData, Problem
 from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, View
-from core.solve.nondimensional import Frame, frame_of, height_profile
+from core.solve.nondimensional import RoomFrame, frame_of, height_profile
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(4.0, 3.0, 3.0))
 INLET = Inlet(
@@ -32,7 +32,7 @@ PLANE = PlaneData(
 )
 
 
-def column(problem: Problem) -> tuple[Frame, np.ndarray, np.ndarray]:
+def column(problem: Problem) -> tuple[RoomFrame, np.ndarray, np.ndarray]:
     """The frame, and T [K] and p [m2/s2] over height."""
     frame = frame_of(problem)
     found = height_profile(problem, frame, frame.vertices((3, 3, 9)))
