@@ -13,6 +13,7 @@ from core.scene import Heater, Inlet
 
 # An entry is contradicted if the fit moves it by more than this many prior, and posterior, standard deviations.
 _SIGMAS = 2.0
+_INTERVAL = 1.96
 # Missing heat is reported above this share of the heat that the supplies bring.
 _MISSING_SHARE = 0.1
 # The velocity is called doubtful if more than this share of the shifts (rms) is unexplained.
@@ -54,11 +55,30 @@ def contradictions(problem: Problem, prior: Prior, posterior: Posterior) -> list
                 f"{abs(by_k):.1f} K {'warmer' if by_k > 0 else 'colder'} than the "
                 f"{heater.temperature_k:.2f} K entered. Check it."
             )
+    said += objects_heat(problem, prior, posterior, believed)
     if "log_closure" in believed:
         said.append(
             f"The measurements ask for {float(np.exp(fitted.log_closure)):.2f} times the closure's eddy "
             "viscosity: another closure may describe this room better."
         )
+    return said
+
+
+def objects_heat(problem: Problem, prior: Prior, posterior: Posterior, believed: set[str]) -> list[str]:
+    """The fitted heat of each object of stated power, with its 95 % interval."""
+    fitted = prior.parameters(posterior.vector)
+    own = dict(zip(prior.names(), np.sqrt(np.diag(posterior.covariance)), strict=True))
+    said = []
+    for n, item in enumerate(problem.scene.objects):
+        name = f"object_power_w[{n}]"
+        if name not in own:
+            continue
+        watts, spread = float(fitted.object_power_w[n]), _INTERVAL * item.power_std_w * float(own[name])
+        text = (
+            f"The object {item.name!r} gives {watts:.0f} W to the air (95 %: {watts - spread:.0f} to "
+            f"{watts + spread:.0f} W; entered: {item.power_w:.0f} W)."
+        )
+        said.append(text + (" The measurements contradict the entry. Check it." if name in believed else ""))
     return said
 
 
@@ -113,13 +133,16 @@ def balances(
         return []
     capacity_w_m3_k = problem.scene.air.density_kg_m3 * 1006.0
     brought = capacity_w_m3_k * float(np.dot(inflows_m3_s, np.asarray(parameters.inlet_excess_k)))
+    by_objects = float(parameters.object_power_w.sum())
     carried = capacity_w_m3_k * inflow_m3_s * outflow_excess_k
+    added = f", objects give {by_objects:.0f} W" if problem.scene.objects else ""
     said = [
-        f"Supply air brings {brought:.0f} W above ambient; {carried:.0f} W leave by the outlets and "
-        f"{brought - carried:.0f} W through walls and heaters. {3600 * inflow_m3_s:.0f} m3/h flow through."
+        f"Supply air brings {brought:.0f} W above ambient{added}; {carried:.0f} W leave by the outlets and "
+        f"{brought + by_objects - carried:.0f} W through walls and heaters. {3600 * inflow_m3_s:.0f} m3/h flow "
+        "through."
     ]
     missing = capacity_w_m3_k * held_k_m3_s
-    if abs(missing) > _MISSING_SHARE * abs(brought):
+    if abs(missing) > _MISSING_SHARE * (abs(brought) + abs(by_objects)):
         said.append(
             f"To hold the measured temperatures the fitted room needs {abs(missing):.0f} W "
             f"{'more' if missing > 0 else 'less'} than supply, heaters and walls give it: a source, a leak or a "

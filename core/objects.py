@@ -1,0 +1,80 @@
+"""What stands in the room: boxes with a thermal condition, and ready ones with sizes and heat from the literature."""
+
+from typing import Literal
+
+from core.geometry import Vector3
+from core.setting import SettingError, check_kelvin, check_range, setting
+
+
+@setting
+class RoomObject:
+    """A solid box in the room, its faces parallel to the walls: a person, a desk, a cabinet.
+
+    No air is in it, and no air flows through its faces.
+    """
+
+    name: str
+    """What it is called in results."""
+    lower_m: Vector3
+    """The corner with the smallest x, y and z."""
+    upper_m: Vector3
+    """The corner with the largest x, y and z."""
+    thermal: Literal["adiabatic", "temperature", "power"] = "adiabatic"
+    """What is known: that it passes no heat, its surface's temperature, or the heat that it gives to the air."""
+    temperature_k: float | None = None
+    """With `temperature`: that of its surface."""
+    temperature_std_k: float = 0.5
+    """Standard deviation of it."""
+    power_w: float | None = None
+    """With `power`: its convective heat in watts; below 0 where it cools the air. Radiation is not part of it."""
+    power_std_w: float = 15.0
+    """Standard deviation of it."""
+
+    def __post_init__(self) -> None:
+        if not all(low < high for low, high in zip(self.lower_m, self.upper_m, strict=True)):
+            raise SettingError(
+                f"The object {self.name!r} has no volume: {self.lower_m} to {self.upper_m} m. "
+                "Give lower_m below upper_m along all three axes, in metres."
+            )
+        given = {"temperature": self.temperature_k, "power": self.power_w}
+        for kind, value in given.items():
+            key = "temperature_k" if kind == "temperature" else "power_w"
+            if (self.thermal == kind) != (value is not None):
+                raise SettingError(
+                    f"The object {self.name!r} has thermal = {self.thermal!r} and {key} = {value}; "
+                    f"give {key} with thermal = {kind!r}, and only then."
+                )
+        if self.temperature_k is not None:
+            check_kelvin(f"The temperature of the object {self.name!r}", self.temperature_k)
+        if self.power_w is not None:
+            check_range(
+                f"power_w of the object {self.name!r}",
+                self.power_w,
+                -1e5,
+                1e5,
+                "W",
+                "A person gives about 75 W.",
+            )
+        for what, std, unit in (
+            ("temperature_std_k", self.temperature_std_k, "K"),
+            ("power_std_w", self.power_std_w, "W"),
+        ):
+            check_range(
+                f"{what} of the object {self.name!r}", std, 1e-9, 1e6, unit,
+                "It is one standard deviation: nothing is known exactly.",
+            )  # fmt: skip
+
+    @property
+    def size_m(self) -> Vector3:
+        """Extent along x, y, z."""
+        x, y, z = (high - low for low, high in zip(self.lower_m, self.upper_m, strict=True))
+        return x, y, z
+
+
+def shared_m(one: RoomObject, other: RoomObject) -> Vector3:
+    """How far two boxes reach into one another along each axis; 0 or below where they do not."""
+    x, y, z = (
+        min(h1, h2) - max(l1, l2)
+        for l1, h1, l2, h2 in zip(one.lower_m, one.upper_m, other.lower_m, other.upper_m, strict=True)
+    )
+    return x, y, z
