@@ -78,3 +78,60 @@ def shared_m(one: RoomObject, other: RoomObject) -> Vector3:
         for l1, h1, l2, h2 in zip(one.lower_m, one.upper_m, other.lower_m, other.upper_m, strict=True)
     )
     return x, y, z
+
+
+@setting
+class ReadyObject:
+    """A kind of object that rooms often hold: its size, its heat, and where both come from."""
+
+    size_m: Vector3
+    """Extent along x, y, z, as seen by the camera."""
+    power_w: float | None = None
+    """Its convective heat; None for one that gives none."""
+    power_std_w: float = 15.0
+    """Standard deviation of it."""
+    source: str
+    """Where size and heat come from."""
+
+
+# A person's power is all the sensible heat. A third to two thirds of it leaves as radiation and reaches the air by
+# way of the walls; the deviation covers that.
+READY: dict[str, ReadyObject] = {
+    "seated_person": ReadyObject(
+        size_m=(0.4, 0.4, 1.2), power_w=75.0, power_std_w=20.0,
+        source="75 W sensible, office work: ASHRAE Fundamentals 2017, ch. 18, table 1; "
+        "surface of 1.8 m2: DuBois and DuBois 1916",
+    ),
+    "standing_person": ReadyObject(
+        size_m=(0.45, 0.25, 1.75), power_w=75.0, power_std_w=25.0,
+        source="75 W sensible, standing, light work: ASHRAE Fundamentals 2017, ch. 18, table 1; "
+        "height and shoulders: usual of adults",
+    ),
+    "desk": ReadyObject(size_m=(1.6, 0.8, 0.74), source="height: EN 527-1; a usual table top; as a solid block"),
+    "cabinet": ReadyObject(size_m=(0.8, 0.42, 1.95), source="a usual office cabinet of five files"),
+    "screen": ReadyObject(
+        size_m=(0.55, 0.1, 0.35), power_w=25.0, power_std_w=10.0,
+        source="a display of 24 inches; 15 to 35 W when on, by makers' data sheets",
+    ),
+    "radiator": ReadyObject(
+        size_m=(1.0, 0.1, 0.6), power_w=600.0, power_std_w=200.0,
+        source="panel radiator of type 22, 30 K warmer than the room, by EN 442's exponent 1.3; "
+        "two thirds of its heat by convection: judged",
+    ),
+}  # fmt: skip
+
+
+def ready_object(kind: str, name: str, foot_m: Vector3) -> RoomObject:
+    """A ready object whose base has its middle at `foot_m`. Raises SettingError for an unknown kind."""
+    if kind not in READY:
+        raise SettingError(f"There is no ready object {kind!r}; expected one of {', '.join(READY)}.")
+    ready, (x, y, z) = READY[kind], foot_m
+    sx, sy, sz = ready.size_m
+    return RoomObject(
+        name=name,
+        lower_m=(x - sx / 2, y - sy / 2, z),
+        upper_m=(x + sx / 2, y + sy / 2, z + sz),
+        thermal="adiabatic" if ready.power_w is None else "power",
+        power_w=ready.power_w,
+        power_std_w=ready.power_std_w,
+    )
