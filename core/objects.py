@@ -1,6 +1,10 @@
 """What stands in the room: boxes with a thermal condition, and ready ones with sizes and heat from the literature."""
 
+from collections.abc import Sequence
 from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool
 
 from core.geometry import Vector3
 from core.setting import SettingError, check_kelvin, check_range, setting
@@ -69,6 +73,20 @@ class RoomObject:
         """Extent along x, y, z."""
         x, y, z = (high - low for low, high in zip(self.lower_m, self.upper_m, strict=True))
         return x, y, z
+
+
+def inside_objects(
+    objects: Sequence[RoomObject], axes_m: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> Bool[np.ndarray, "nx ny nz"]:
+    """Which points of a grid lie in or on an object."""
+    inside = np.zeros([len(axis) for axis in axes_m], bool)
+    for item in objects:
+        x, y, z = (
+            (axis >= low - 1e-5) & (axis <= high + 1e-5)
+            for axis, low, high in zip(axes_m, item.lower_m, item.upper_m, strict=True)
+        )
+        inside |= x[:, None, None] & y[None, :, None] & z[None, None, :]
+    return inside
 
 
 def shared_m(one: RoomObject, other: RoomObject) -> Vector3:

@@ -131,7 +131,7 @@ def balances(
     inflow_m3_s = float(inflows_m3_s.sum())
     if inflow_m3_s <= 0:
         return []
-    capacity_w_m3_k = problem.scene.air.density_kg_m3 * 1006.0
+    capacity_w_m3_k = problem.scene.air.heat_capacity_j_m3_k
     brought = capacity_w_m3_k * float(np.dot(inflows_m3_s, np.asarray(parameters.inlet_excess_k)))
     by_objects = float(parameters.object_power_w.sum())
     carried = capacity_w_m3_k * inflow_m3_s * outflow_excess_k

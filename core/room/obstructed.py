@@ -15,35 +15,49 @@ from functools import lru_cache
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
-from scipy import ndimage, sparse
+from jaxtyping import Array, Float, Float32, Int
+from scipy import sparse
 
 from core.room.pressure import PressureSolver, divergence_per_s, pressure_solver
 from core.room.room_grid import AXES, Cells, RoomGrid, Velocity, difference
-from core.room.solids import Solids
+from core.room.solids import Solids, pieces
 
 
 class ObstructedSolver(eqx.Module):
-    """The box's solver; the cells below and above each face of an object, their distance, and minus the inverse."""
+    """The box's solver; the cells below and above each face of an object, their distance, and minus the inverse.
+
+    `open_faces` is 1 where air may pass.
+    """
 
     box: PressureSolver
     below: Int[Array, " faces"]
     above: Int[Array, " faces"]
     spacing_m: Float[Array, " faces"]
     force: Float[Array, "faces faces"]
+    open_faces: Velocity
 
 
 def obstructed_solver(grid: RoomGrid, solids: Solids) -> ObstructedSolver:
     """The solver of this grid and these objects; the matrix is kept for the last few."""
     beside, behind = np.asarray(solids.beside), np.asarray(solids.behind)
-    return _solver(grid, beside.tobytes(), behind.tobytes(), solids.count, np.asarray(solids.air).tobytes())
+    below, above = np.minimum(beside, behind), np.maximum(beside, behind)
+    force = _force(grid, below.tobytes(), above.tobytes(), solids.count, np.asarray(solids.air).tobytes())
+    return ObstructedSolver(
+        pressure_solver(grid),
+        jnp.asarray(below, jnp.int32),
+        jnp.asarray(above, jnp.int32),
+        2.0 * solids.centre_m,
+        jnp.asarray(force),
+        solids.open_faces,
+    )
 
 
 def project_obstructed(
-    velocity: Velocity, dt_s: Float[Array, ""], grid: RoomGrid, solver: ObstructedSolver, solids: Solids
+    velocity: Velocity, dt_s: Float[Array, ""], grid: RoomGrid, solver: ObstructedSolver
 ) -> tuple[Velocity, Cells]:
     """Velocity without divergence and without flow through objects, and the pressure [m2/s2] that made it so."""
-    velocity = solids.stopped(velocity)
+    u, v, w = (velocity[a] * solver.open_faces[a] for a in AXES)
+    velocity = u, v, w
     source = divergence_per_s(velocity, grid) / dt_s
     pressure = solver.box.solve(source)
     flat = pressure.reshape(-1)
@@ -52,7 +66,7 @@ def project_obstructed(
     source = source.reshape(-1).at[solver.below].add(force).at[solver.above].add(-force).reshape(source.shape)
     pressure = solver.box.solve(source)
     u, v, w = (
-        velocity[a] - _padded(difference(pressure, a) * (dt_s / grid.spacing_m[a]), a) * solids.open_faces[a]
+        velocity[a] - _padded(difference(pressure, a) * (dt_s / grid.spacing_m[a]), a) * solver.open_faces[a]
         for a in AXES
     )
     return (u, v, w), pressure
@@ -63,12 +77,12 @@ def _padded(inner: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
 
 
 @lru_cache(maxsize=4)
-def _solver(
-    grid: RoomGrid, beside_bytes: bytes, behind_bytes: bytes, count: tuple[int, int, int], air_bytes: bytes
-) -> ObstructedSolver:
-    beside, behind = (np.frombuffer(b, np.int32).astype(np.int64) for b in (beside_bytes, behind_bytes))
-    air = np.frombuffer(air_bytes, np.float32).reshape(grid.cells) > 0
-    below, above = np.minimum(beside, behind), np.maximum(beside, behind)
+def _force(
+    grid: RoomGrid, below_bytes: bytes, above_bytes: bytes, count: tuple[int, int, int], air_bytes: bytes
+) -> Float32[np.ndarray, "faces faces"]:
+    """Minus the inverse of the capacitance matrix."""
+    below, above = (np.frombuffer(b, np.int32).astype(np.int64) for b in (below_bytes, above_bytes))
+    solid = np.frombuffer(air_bytes, np.float32).reshape(grid.cells) == 0
     spacing_m = np.repeat(np.array(grid.spacing_m), count)
     cells, place = np.unique(np.concatenate([below, above]), return_inverse=True)
     rows = np.arange(len(below))
@@ -82,14 +96,10 @@ def _solver(
     green = _green(grid, np.stack(np.unravel_index(cells, grid.cells)))
     matrix = np.eye(len(rows)) + slope @ (slope @ green).T
     # A force that is the gradient of a potential of whole objects does nothing: these are the matrix's null space.
-    label = ndimage.label(~air)[0].ravel()
-    potentials = np.stack([label == n for n in range(1, int(label.max()) + 1)], axis=1).astype(float)
+    label, found = pieces(solid)
+    potentials = np.stack([label.ravel() == n + 1 for n in range(found)], axis=1).astype(float)
     idle = np.linalg.qr((potentials[above] - potentials[below]) / spacing_m[:, None])[0]
-    force = -np.linalg.inv(matrix + idle @ idle.T)
-    as_int = (jnp.asarray(of, jnp.int32) for of in (below, above))
-    return ObstructedSolver(
-        pressure_solver(grid), *as_int, jnp.asarray(spacing_m, jnp.float32), jnp.asarray(force, jnp.float32)
-    )
+    return -np.linalg.inv(matrix + idle @ idle.T).astype(np.float32)
 
 
 def _green(grid: RoomGrid, cells: Int[np.ndarray, "3 cells"]) -> Float[np.ndarray, "cells cells"]:

@@ -5,6 +5,8 @@ faces between air and solid are walls: no flow, the friction and heat of the wal
 A room without objects has no `Solids` at all, and none of this is compiled.
 """
 
+from typing import cast
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -29,7 +31,7 @@ class SurfaceHeat(eqx.Module):
 class Solids(eqx.Module):
     """Where no air is. `air` is 1 in cells of air; `open_faces[a]` is 1 on faces normal to a between two of them.
 
-    `open_edges[a][b]`: 1 on the edges between neighbouring a-faces along b whose four cells are all air.
+    `open_edges[a][b]`: 1 on the edges between neighbouring a-faces along b whose four cells are all air (none, a = b).
     The objects' `faces` are listed axis by axis, `count` of each: the flat index of the cell of air `beside` and of
     the solid cell `behind`, the distance from the face to that air's centre, and the object.
     `nearest` is the flat index of the air cell nearest to each cell.
@@ -38,7 +40,7 @@ class Solids(eqx.Module):
     count: tuple[int, int, int] = eqx.field(static=True)
     air: Cells
     open_faces: Velocity
-    open_edges: tuple[tuple[Array | None, ...], ...]
+    open_edges: tuple[tuple[Array, ...], ...]
     beside: Int[Array, " faces"]
     behind: Int[Array, " faces"]
     centre_m: Faces
@@ -64,11 +66,6 @@ class Solids(eqx.Module):
         """`field` with the nearest air's values in the solid cells."""
         return field.reshape(-1)[self.nearest]
 
-    def stopped(self, velocity: Velocity) -> Velocity:
-        """`velocity` without flow into, out of and within the objects."""
-        u, v, w = (velocity[a] * self.open_faces[a] for a in AXES)
-        return u, v, w
-
 
 def lay_objects(objects: tuple[RoomObject, ...], grid: RoomGrid, notes: list[str]) -> Solids | None:
     """The objects on `grid`, without heat; None where there are none. Adds a sentence to `notes` for thin ones.
@@ -88,12 +85,17 @@ def lay_objects(objects: tuple[RoomObject, ...], grid: RoomGrid, notes: list[str
                 "takes its place. Join the two, or use a finer grid."
             )
     solid = owner >= 0
-    if ndimage.label(~solid)[1] != 1:
+    if pieces(~solid)[1] != 1:
         raise SettingError(
             "The objects shut off a part of the room, on the grid of "
             f"{' x '.join(map(str, grid.cells))} cells. Leave a gap of two cells, or fill that part with an object."
         )
     return _solids(solid, owner, grid)
+
+
+def pieces(where: Bool[np.ndarray, "nx ny nz"]) -> tuple[Int[np.ndarray, "nx ny nz"], int]:
+    """Cells that hang together by faces, numbered from 1, and how many such pieces there are."""
+    return cast("tuple[np.ndarray, int]", ndimage.label(where))
 
 
 def _cells_of(item: RoomObject, grid: RoomGrid, notes: list[str]) -> tuple[slice, ...]:
@@ -127,9 +129,11 @@ def _solids(
         count.append(int(found.sum()))
         centre_m.append(np.full(count[a], 0.5 * grid.spacing_m[a]))
         area_m2.append(np.full(count[a], grid.face_area_m2(a)))
-    # Not the return_distances default: only the places of the nearest air.
-    places = ndimage.distance_transform_edt(
-        solid, sampling=grid.spacing_m, return_distances=False, return_indices=True
+    places = cast(
+        "np.ndarray",
+        ndimage.distance_transform_edt(
+            solid, sampling=grid.spacing_m, return_distances=False, return_indices=True
+        ),
     )
     air = ~solid
     zero = jnp.zeros(sum(count), jnp.float32)
@@ -139,7 +143,7 @@ def _solids(
         (count[0], count[1], count[2]),
         _f32(air),
         (u, v, w),
-        tuple(tuple(None if a == b else _f32(_edges(air, a, b)) for b in AXES) for a in AXES),
+        tuple(tuple(jnp.zeros(0) if a == b else _f32(_edges(air, a, b)) for b in AXES) for a in AXES),
         jnp.asarray(np.concatenate(beside), jnp.int32),
         jnp.asarray(at, jnp.int32),
         _f32(np.concatenate(centre_m)),

@@ -114,10 +114,11 @@ def step(flow: Flow, viscosity: Viscosity, model: RoomModel, dt_s: Float[Array, 
     excess_k = flow.excess_k + dt_s * heating
     rates = momentum_rate(flow.velocity, viscosity, model.buoyancy_m_s2_k * excess_k, boundary, grid)
     u, v, w = (_advance_inner(flow.velocity[a], dt_s * rates[a], a) for a in AXES)
-    if isinstance(model.pressure, ObstructedSolver) and solids is not None:
-        velocity, pressure = project_obstructed((u, v, w), dt_s, grid, model.pressure, solids)
+    solver = model.pressure
+    if isinstance(solver, PressureSolver):
+        velocity, pressure = project((u, v, w), dt_s, grid, solver)
     else:
-        velocity, pressure = project((u, v, w), dt_s, grid, model.pressure)
+        velocity, pressure = project_obstructed((u, v, w), dt_s, grid, solver)
     return Flow(velocity, excess_k, pressure, flow.turbulence)
 
 
