@@ -9,6 +9,7 @@ and on the walls. k-epsilon has no buoyancy term in the equations of k and epsil
 """
 
 import abc
+from typing import cast
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -184,7 +185,9 @@ def wall_distance_m(grid: RoomGrid, solids: Solids | None = None) -> Cells:
         distance = jnp.minimum(distance, nearest.reshape([-1 if b == a else 1 for b in AXES]))
     if solids is None:
         return distance
-    to_centre_m = ndimage.distance_transform_edt(np.asarray(solids.air), sampling=grid.spacing_m)
+    to_centre_m = cast(
+        "np.ndarray", ndimage.distance_transform_edt(np.asarray(solids.air), sampling=grid.spacing_m)
+    )
     to_face_m = np.maximum(to_centre_m - 0.5 * min(grid.spacing_m), 0.0)
     return jnp.minimum(distance, jnp.asarray(to_face_m, jnp.float32))
 

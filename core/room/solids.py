@@ -31,7 +31,7 @@ class SurfaceHeat(eqx.Module):
 class Solids(eqx.Module):
     """Where no air is. `air` is 1 in cells of air; `open_faces[a]` is 1 on faces normal to a between two of them.
 
-    `open_edges[a][b]`: 1 on the edges between neighbouring a-faces along b whose four cells are all air (none, a = b).
+    `open_edges[a][b]`: 1 on the edges between neighbouring a-faces along b whose four cells are air (none, a = b).
     The objects' `faces` are listed axis by axis, `count` of each: the flat index of the cell of air `beside` and of
     the solid cell `behind`, the distance from the face to that air's centre, and the object.
     `nearest` is the flat index of the air cell nearest to each cell.
