@@ -4,6 +4,7 @@ import numpy as np
 
 from core.geometry import Box, looking_along_y
 from core.objects import RoomObject
+from core.plan.verdicts import hidden_wall
 from core.rays.visibility import away_from_walls, hidden_by_objects, sees_wall
 from core.scene import FixedTexture, ProjectedPattern, Scene, View
 
@@ -45,3 +46,15 @@ def test_what_keeps_the_projector_from_the_wall_hides_it_too():
 
 def test_without_objects_nothing_is_hidden():
     assert not hidden_by_objects(replace(SCENE, objects=()), 0, PIXELS, margin_px=50.0).any()
+
+
+def test_the_plan_says_how_much_of_the_wall_is_hidden():
+    """The thing hides 1 m x 2 m (8 m to its front) of 4 m x 3 m, and margins of 8 px (0.08 m) more."""
+    said = hidden_wall(SCENE, 0, 8)
+
+    share = float(said.split("hide ")[1].split(" %")[0])
+    assert 14.0 < share < 25.0
+    assert "That is much" not in said
+    big = replace(THING, lower_m=(0.2, 1.0, 0.0), upper_m=(3.8, 2.0, 2.5))
+    assert "That is much" in hidden_wall(replace(SCENE, objects=(big,)), 0, 8)
+    assert hidden_wall(replace(SCENE, objects=()), 0, 8) == ""
