@@ -13,6 +13,7 @@ from core.setting import check_range, setting
 
 GAS_CONSTANT_DRY_AIR_J_KG_K = 287.05
 GRAVITY_M_S2 = 9.81
+HEAT_CAPACITY_J_KG_K = 1006.0
 
 # Ciddor (1996), dry air: wavelength [m], Gladstone-Dale coefficient [m3/kg].
 _GLADSTONE_DALE = np.array(
@@ -87,6 +88,11 @@ class Air:
         """N0 = rho0 G: refractivity of the air at rest (2.72e-4 at 20 C)."""
         coefficient = self.gladstone_dale or gladstone_dale_m3_kg(self.wavelength_m)
         return self.density_kg_m3 * coefficient
+
+    @property
+    def heat_capacity_j_m3_k(self) -> float:
+        """Heat capacity of a cubic metre of the air at rest."""
+        return self.density_kg_m3 * HEAT_CAPACITY_J_KG_K
 
     @property
     def expansion_per_k(self) -> float:

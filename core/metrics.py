@@ -2,7 +2,8 @@
 
 All on the truth's vertices. The three walls with a thermal layer inside the first cell (x max, y min,
 y max) are left out, since no smooth field can follow it. Departures are from the mean at each height:
-most of T - T0 is a bulk offset and a stratification, which flatter any answer.
+most of T - T0 is a bulk offset and a stratification, which flatter any answer. Vertices where the truth is NaN
+(objects, which hold no air) count nowhere.
 """
 
 from typing import Any
@@ -25,12 +26,20 @@ def inner(volume: np.ndarray) -> np.ndarray:
 def rms(values: np.ndarray) -> float:
     """Root mean square; of vectors, of their length."""
     squares = np.square(values, dtype=np.float64)
-    return float(np.sqrt(np.mean(squares.sum(-1) if values.ndim == 4 else squares)))
+    return float(np.sqrt(mean_of_air(squares.sum(-1) if values.ndim == 4 else squares)))
+
+
+def mean_of_air(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -> Any:
+    """Mean of what is not NaN, axes kept unless all are meant; 0 where all is."""
+    air = ~np.isnan(values)
+    kept = axis is not None
+    total = np.where(air, values, 0).sum(axis=axis, keepdims=kept)
+    return total / np.maximum(air.sum(axis=axis, keepdims=kept), 1)
 
 
 def departure(volume: Volume) -> Volume:
     """Departure from the mean at each height."""
-    return volume - volume.mean(axis=(0, 1), keepdims=True)
+    return volume - mean_of_air(volume, axis=(0, 1))
 
 
 def ratio(numerator: float, denominator: float) -> float | None:
@@ -41,7 +50,7 @@ def ratio(numerator: float, denominator: float) -> float | None:
 def score_temperature(found_k: Volume, truth_k: Volume, ambient_k: float) -> dict[str, Any]:
     """rms error in K, relative to the departure from each height's mean, and the trivial answers in K."""
     truth = inner(truth_k)
-    y_mean = np.broadcast_to(truth.mean(axis=1, keepdims=True), truth.shape)
+    y_mean = np.broadcast_to(mean_of_air(truth, axis=1), truth.shape)
     scale = rms(departure(truth))
     error = rms(inner(found_k) - truth)
     return {
@@ -77,10 +86,10 @@ def score_velocity(found_m_s: Vectors, truth_m_s: Vectors, supply_m_s: float) ->
 
 def score_pressure(found: Volume, truth: Volume) -> dict[str, Any]:
     """rms error relative to the rms of p, both about their mean (p is known up to a constant)."""
-    t, f = (inner(v) - inner(v).mean() for v in (truth, found))
+    t, f = (inner(v) - mean_of_air(inner(v)) for v in (truth, found))
     plane = t[:1] - t
     return {
         "rel": ratio(rms(f - t), rms(t)),
         "rel_departure": ratio(rms(departure(f) - departure(t)), rms(departure(t))),
-        "trivial": {"inlet_plane": ratio(rms(plane - plane.mean()), rms(t)), "zero": 1.0},
+        "trivial": {"inlet_plane": ratio(rms(plane - mean_of_air(plane)), rms(t)), "zero": 1.0},
     }

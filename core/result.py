@@ -1,11 +1,15 @@
 """What a solver hands back: the air on a vertex grid, how it ended, and what it cost."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from enum import Enum
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
+from scipy import ndimage
+
+from core.objects import RoomObject, inside_objects
 
 
 class Outcome(Enum):
@@ -26,7 +30,7 @@ class Solution(eqx.Module):
 
     Standard deviations are one sigma, on the same grid; `informed` is the share of the prior variance of
     T that the measurements removed (0: the model speaks alone). `history` holds one dict a recorded
-    iteration: numbers, and in `doing` what was done.
+    iteration: numbers, and in `doing` what was done. All fields are NaN in and on objects, which hold no air.
     """
 
     x_m: Float[np.ndarray, " nx"]
@@ -43,3 +47,43 @@ class Solution(eqx.Module):
     solver_s: float = 0.0
     history: tuple[Mapping[str, float | str], ...] = eqx.field(static=True, default=())
     notes: tuple[str, ...] = eqx.field(static=True, default=())
+
+    @property
+    def air(self) -> Bool[np.ndarray, "nx ny nz"]:
+        """Where there is air: everywhere but in and on objects."""
+        return ~np.isnan(self.temperature_k)
+
+    def without_objects(self, objects: Sequence[RoomObject]) -> "Solution":
+        """The same with NaN in and on these objects."""
+        if not objects:
+            return self
+        inside = inside_objects(objects, (self.x_m, self.y_m, self.z_m))
+
+        def masked(field: np.ndarray | None) -> np.ndarray | None:
+            if field is None:
+                return None
+            return np.where(inside if field.ndim == 3 else inside[..., None], np.nan, field).astype(
+                field.dtype
+            )
+
+        return replace(self, **{name: masked(getattr(self, name)) for name in _FIELDS})
+
+    def filled(self) -> "Solution":
+        """For what needs a number everywhere: in objects the nearest air's values, and no velocity."""
+        if self.air.all():
+            return self
+        solid = ~self.air
+        places = tuple(ndimage.distance_transform_edt(solid, return_distances=False, return_indices=True))
+        fields = {name: getattr(self, name) for name in _FIELDS}
+        full = {name: None if field is None else field[places] for name, field in fields.items()}
+        if self.velocity_m_s is not None:
+            full["velocity_m_s"] = np.where(solid[..., None], 0.0, self.velocity_m_s).astype(
+                self.velocity_m_s.dtype
+            )
+        return replace(self, **full)
+
+
+_FIELDS = (
+    "temperature_k", "pressure_m2_s2", "velocity_m_s", "temperature_std_k", "pressure_std_m2_s2",
+    "velocity_std_m_s", "informed",
+)  # fmt: skip

@@ -5,10 +5,12 @@ value is used as given. Lists (`views`, `boundary`) may hold one entry or many; 
 means that nothing is known but the images.
 """
 
+from itertools import combinations
 from typing import Literal
 
 from core.air import Air
-from core.geometry import Box, Optics, Vector2, Vector3, WallName
+from core.geometry import Box, Optics, Vector2, Vector3, WallName, face_of
+from core.objects import RoomObject, shared_m
 from core.setting import SettingError, check_kelvin, check_range, setting
 
 Auto = Literal["auto"]
@@ -376,6 +378,8 @@ class Scene:
     """What patterns the wall."""
     boundary: tuple[BoundaryInformation, ...] = ()
     """What is known of openings, walls and sensors; empty: the pictures alone."""
+    objects: tuple[RoomObject, ...] = ()
+    """What stands in the room: people, desks, cabinets."""
     flow: FlowModel = FlowModel()
     """How air moves in the model."""
     rays: RayModel = RayModel()
@@ -390,6 +394,7 @@ class Scene:
             _check_place(f"Camera {view.name!r}", view.camera.position_m, self.room)
         if isinstance(self.light, ProjectedPattern):
             _check_place("The projector", self.light.projector.position_m, self.room)
+        _check_objects(self)
 
 
 def _check_std(what: str, value: float, unit: str) -> None:
@@ -407,3 +412,46 @@ def _check_place(what: str, position_m: Vector3, room: Box) -> None:
     reach_m = sum((p - c) ** 2 for p, c in zip(position_m, room.centre_m, strict=True)) ** 0.5
     advice = "Were millimetres given for metres?"
     check_range(f"{what}'s distance from the room", reach_m, 0.0, 2000.0, "m", advice)
+
+
+def _check_objects(scene: Scene) -> None:
+    """Objects lie in the room, apart from one another, with names of their own, and before no opening."""
+    for item in scene.objects:
+        _check_inside(item, scene.room)
+        for part in scene.boundary:
+            if isinstance(part, Inlet | Outlet) and _stands_before(item, part.patch, scene.room):
+                raise SettingError(
+                    f"The object {item.name!r} stands against the {part.kind} on {part.patch.wall} "
+                    f"({part.patch.lower_m} to {part.patch.upper_m} m), so no air can pass there. Move one of them."
+                )
+    for one, other in combinations(scene.objects, 2):
+        if one.name == other.name:
+            raise SettingError(
+                f"Two objects are called {one.name!r}; results name objects, so give each a name of its own."
+            )
+        if min(shared_m(one, other)) > 1e-6:
+            raise SettingError(
+                f"The objects {one.name!r} and {other.name!r} overlap; move one, or make one of the two smaller."
+            )
+
+
+def _check_inside(item: RoomObject, room: Box) -> None:
+    for a, axis in enumerate("xyz"):
+        if item.lower_m[a] < room.lower_m[a] - 1e-6 or item.upper_m[a] > room.upper_m[a] + 1e-6:
+            raise SettingError(
+                f"The object {item.name!r} spans {item.lower_m[a]:g} to {item.upper_m[a]:g} m along {axis}; the "
+                f"room spans {room.lower_m[a]:g} to {room.upper_m[a]:g} m. Move it into the room."
+            )
+
+
+def _stands_before(item: RoomObject, patch: Patch, room: Box) -> bool:
+    """Whether an object touches its wall over a part of the patch."""
+    face = face_of(patch.wall)
+    side_m = (item.upper_m if face.upper else item.lower_m)[face.axis]
+    if abs(side_m - face.place_m(room)) > 1e-3:
+        return False
+    shared = [
+        min(item.upper_m[a], high) - max(item.lower_m[a], low)
+        for a, low, high in zip(face.along, patch.lower_m, patch.upper_m, strict=True)
+    ]
+    return min(shared) > 1e-6

@@ -15,7 +15,7 @@ from core.camera_noise import frame_variance, scattered_variance
 from core.displacement import resolve_window_px, window_centres
 from core.drift import Similarity, move_image
 from core.problem import ImagePair, ShiftMeasurement
-from core.rays.visibility import sees_wall
+from core.rays.visibility import hidden_by_objects, sees_wall
 from core.scene import Scene, View
 from core.window_fit import derivative_filter
 
@@ -82,6 +82,7 @@ def _measure_view(
     # the filter of its gradient.
     reach_px = 0.5 * window_px + len(derivative_filter()) // 2
     beyond = ~sees_wall(scene, index, centres, margin_px=-reach_px)
+    beyond &= ~hidden_by_objects(scene, index, centres, margin_px=float(window_px))
     prior, said = mount(view.drift_std_px), ""
     if captures.after is not None:
         found = between_references(captures, scene, index)

@@ -75,7 +75,14 @@ PRESETS: Mapping[str, Solve] = {
 
 
 def solved(solve: Solve, problem: Problem, watch: Watch) -> Solution:
-    """Solve, going on from what is kept; afresh, and told so, where that is of another problem or other settings."""
+    """Solve, going on from what is kept; afresh, and told so, where that is of another problem or other settings.
+
+    Nothing is said of the air where objects are.
+    """
+    return _solved(solve, problem, watch).without_objects(problem.scene.objects)
+
+
+def _solved(solve: Solve, problem: Problem, watch: Watch) -> Solution:
     try:
         return solve(problem, watch)
     except ForeignCheckpointError:

@@ -90,5 +90,5 @@ def _write_csv(path: Path, solution: Solution) -> None:
 
 def _write_png(path: Path, solution: Solution) -> None:
     """The middle planes of the temperature, with arrows where velocity is known."""
-    level_k = float(np.round(np.mean(solution.temperature_k), 1))
+    level_k = float(np.round(np.nanmean(solution.temperature_k), 1))
     path.write_bytes(as_png(slices_figure(solution, level_k)))

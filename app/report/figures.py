@@ -91,7 +91,7 @@ def slices_figure(solution: Solution, ambient_k: float) -> Figure:
     figure = Figure(figsize=(13, 4.2), layout="constrained")
     axes = figure.subplots(1, 3)
     excess = solution.temperature_k - ambient_k
-    low, high = np.percentile(excess, [0.5, 99.5])
+    low, high = np.nanpercentile(excess, [0.5, 99.5])
     drawn = [
         _slice(axis, solution, excess, normal, SEQUENTIAL, float(low), float(high))
         for axis, normal in zip(axes, (1, 0, 2), strict=True)
@@ -104,7 +104,7 @@ def error_figure(solution: Solution, error_k: np.ndarray) -> Figure:
     """Temperature minus truth on the same planes, on the solution's vertices."""
     figure = Figure(figsize=(13, 4.2), layout="constrained")
     axes = figure.subplots(1, 3)
-    limit = float(np.percentile(np.abs(error_k[1:-1, 1:-1, 1:-1]), 98)) or 1e-6
+    limit = float(np.nanpercentile(np.abs(error_k[1:-1, 1:-1, 1:-1]), 98)) or 1e-6
     drawn = [
         _slice(axis, solution, error_k, normal, DIVERGING, -limit, limit, arrows=False)
         for axis, normal in zip(axes, (1, 0, 2), strict=True)
@@ -117,7 +117,7 @@ def volume_figure(solution: Solution, values: np.ndarray, label: str, highest: f
     """A volume from zero upwards on the three middle planes."""
     figure = Figure(figsize=(13, 4.2), layout="constrained")
     axes = figure.subplots(1, 3)
-    limit = highest or float(np.percentile(values[1:-1, 1:-1, 1:-1], 99)) or 1e-6
+    limit = highest or float(np.nanpercentile(values[1:-1, 1:-1, 1:-1], 99)) or 1e-6
     drawn = [
         _slice(axis, solution, values, normal, SEQUENTIAL, 0.0, limit, arrows=False)
         for axis, normal in zip(axes, (1, 0, 2), strict=True)

@@ -160,7 +160,7 @@ def _digits(value: float) -> str:
 
 def age_of_air(solution: Solution, scene: Scene, cells: int = CELLS) -> AirChange:
     """The mean age of the air of a result. Raises SettingError where no flow passes the walls."""
-    return air_change(_tracer(found_flow(solution, opening_patches(scene)), cells))
+    return air_change(_tracer(found_flow(solution.filled(), opening_patches(scene)), cells))
 
 
 def _sampled(solution: Solution, scene: Scene, asked: Asked, found: Figures) -> list[Figures]:
@@ -193,7 +193,7 @@ def _figures(
 def _in_the_zone(solution: Solution, scene: Scene, asked: Asked) -> Figures:
     low_m, high_m = asked.zone.box(scene.room)
     axes = (solution.x_m, solution.y_m, solution.z_m)
-    there = _thinned(inside(axes, low_m, high_m))
+    there = _thinned(inside(axes, low_m, high_m) & solution.air)
     kelvin = np.asarray(solution.temperature_k[there], np.float64)
     figures = {
         "temperature_mean": float(kelvin.mean()) - CELSIUS_K,
@@ -220,7 +220,8 @@ def _heights(solution: Solution, there: np.ndarray) -> Figures:
     """Differences between heights: over the zone's footprint, and of the whole room."""
     head, ankle = (at_height(solution.temperature_k, solution.z_m, height) for height in (HEAD_M, ANKLE_M))
     upwards_k = np.asarray(head - ankle, np.float64)[there.any(axis=2)]
-    levels_k = solution.temperature_k.mean(axis=(0, 1), dtype=np.float64)
+    upwards_k = upwards_k[~np.isnan(upwards_k)]
+    levels_k = np.nanmean(solution.temperature_k, axis=(0, 1), dtype=np.float64)
     return {
         "head_to_ankle": float(upwards_k.mean()),
         "head_to_ankle_p95": float(np.percentile(upwards_k, 95)),
@@ -229,6 +230,7 @@ def _heights(solution: Solution, there: np.ndarray) -> Figures:
 
 
 def _of_the_flow(solution: Solution, scene: Scene, asked: Asked, cells: int) -> Figures:
+    solution = solution.filled()
     found = found_flow(solution, opening_patches(scene))
     air = exchange(found, solution.temperature_k, scene)
     transport = _tracer(found, cells)
@@ -257,7 +259,7 @@ def _tracer(found: FaceFlow, cells: int) -> Tracer:
 
 
 def _of_the_jets(solution: Solution, scene: Scene) -> Figures:
-    figures = {}
+    figures, solution = {}, solution.filled()
     supplies = [part for part in scene.boundary if isinstance(part, Inlet)]
     for n, inlet in enumerate(supplies, 1):
         jet = supply_jet(solution, inlet)

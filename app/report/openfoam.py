@@ -19,7 +19,8 @@ _FIELDS = {"T": "[0 0 0 1 0 0 0]", "p": "[0 2 -2 0 0 0 0]", "U": "[0 1 -1 0 0 0 
 
 
 def write_openfoam(path: Path, solution: Solution) -> None:
-    """Write the case as one zip file."""
+    """Write the case as one zip file; cells of objects hold the nearest air's values, at rest."""
+    solution = solution.filled()
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as case:
         case.writestr("case/system/blockMeshDict", _mesh(solution))
         case.writestr("case/system/controlDict", _control())

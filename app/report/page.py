@@ -116,9 +116,10 @@ def _seen(finding: Finding) -> str:
 
 def _air_in_words(finding: Finding) -> str:
     t = finding.solution.temperature_k
+    upwards_k = np.nanmean(t, axis=(0, 1))
     return (
-        f"The air runs from {np.percentile(t, 1):.2f} to {np.percentile(t, 99):.2f} K "
-        f"(1st to 99th percentile), {t.mean(axis=(0, 1))[-1] - t.mean(axis=(0, 1))[0]:+.2f} K from floor to ceiling."
+        f"The air runs from {np.nanpercentile(t, 1):.2f} to {np.nanpercentile(t, 99):.2f} K "
+        f"(1st to 99th percentile), {upwards_k[-1] - upwards_k[0]:+.2f} K from floor to ceiling."
     )
 
 

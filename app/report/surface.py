@@ -15,7 +15,7 @@ def write_ply(path: Path, solution: Solution, level_k: float | None = None) -> N
     Without a level, half-way between the room's mean and what departs from it most. Raises BadInputError where
     the room holds no such temperature.
     """
-    temperature_k = np.asarray(solution.temperature_k, np.float32)
+    temperature_k = np.asarray(solution.filled().temperature_k, np.float32)
     level_k = middle_level_k(temperature_k) if level_k is None else level_k
     low_k, high_k = float(temperature_k.min()), float(temperature_k.max())
     if not low_k < level_k < high_k:

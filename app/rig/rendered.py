@@ -4,23 +4,29 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float, Float32
 
 from app.experiment.folder import Experiment
 from app.experiment.rig_settings import SimulatedCameraSettings
 from app.rig.nuisances import spoiled
 from app.volume.file import RoomVolume, read_volume
+from app.volume.scene import room_objects
 from core.fields import GridField
 from core.geometry import Box, crop, rotation_matrix, rotation_vector
 from core.plan.print_choice import suited_print
+from core.rays.visibility import first_hit, wall_points
 from core.render import render_flow, render_reference
-from core.scene import Scene
+from core.scene import ProjectedPattern, Scene
 
 # The print around a simulated room: as fine as the pattern, but another one.
 FRAME_SEED = 1_000_003
 
+# Rows drawn at a time; what a shadow leaves of the light; periods of what is seen on an object, along x, y, z.
+_ROWS, _UNLIT, _FOLDS_M = 256, 0.02, np.array([0.31, 0.97, 0.23])
+
 AirState = Literal["still", "moving"]
 Picture = Float32[np.ndarray, "rows cols"]
+Picture1 = Float32[np.ndarray, " pixels"]
 
 
 def seen_picture(
@@ -37,12 +43,43 @@ def seen_picture(
 def _rendered(
     experiment: Experiment, settings: SimulatedCameraSettings, scene: Scene, air: AirState, view: int
 ) -> Picture:
+    volume = read_volume(experiment.file(settings.room))
     if air == "still":
         image = render_reference(scene, view)
     else:
-        volume = read_volume(experiment.file(settings.room))
         image = render_flow(scene, volume_field(volume, scene), view)
-    return _framed(image, scene, view) if settings.border == "print" else image
+    framed = _framed(image, scene, view) if settings.border == "print" else image
+    # What stands in the room, whether or not the scene states it.
+    return with_objects(framed, replace(scene, objects=room_objects(volume)), view)
+
+
+def with_objects(image: Picture, scene: Scene, view: int) -> Picture:
+    """The picture with the scene's objects before the wall, and dark where they keep the projector's light off it."""
+    shown = image.copy() if scene.objects else image
+    columns = np.arange(image.shape[1], dtype=float)
+    for first in range(0, image.shape[0] if scene.objects else 0, _ROWS):
+        rows = np.arange(first, min(first + _ROWS, image.shape[0]), dtype=float)
+        pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+        block = shown[first : first + len(rows)].reshape(-1)
+        _draw_objects(block, pixels, scene, view)
+        shown[first : first + len(rows)] = block.reshape(len(rows), -1)
+    return shown
+
+
+def _draw_objects(block: Picture1, pixels: Float[np.ndarray, "pixels 2"], scene: Scene, view: int) -> None:
+    wall_m, eye_m = wall_points(scene, view, pixels), np.array(scene.views[view].camera.position_m)
+    nearest = np.full(len(pixels), np.inf)
+    for item in scene.objects:
+        if isinstance(scene.light, ProjectedPattern):
+            lamp_m = np.array(scene.light.projector.position_m)
+            shade = np.isfinite(first_hit(item, lamp_m, wall_m)) & ~np.isfinite(nearest)
+            block[shade] *= _UNLIT
+        met = first_hit(item, eye_m, wall_m)
+        seen = met < nearest
+        at_m = eye_m + met[seen, None] * (wall_m[seen] - eye_m)
+        waves = np.sin(2 * np.pi * at_m / _FOLDS_M)
+        block[seen] = np.clip(0.4 + 0.15 * waves.prod(axis=1), 0.02, 0.9)
+        nearest[seen] = met[seen]
 
 
 def _framed(image: Picture, scene: Scene, view: int) -> Picture:

@@ -52,6 +52,15 @@ file = "boundary/plane_x_min.npz"
 [[scene.boundary]]
 kind = "inlet"
 length_scale_m = 0.02
+[[scene.objects]]
+name = "person"
+lower_m = [1.8, 1.3, 0.0]
+upper_m = [2.2, 1.7, 1.2]
+thermal = "power"
+power_w = 75.0
+[[scene.objects]]
+name = "cabinet"
+temperature_k = 295.15
 [scene.flow]
 viscosity_m2_s = 1e-3
 diffusivity_m2_s = 1e-3
@@ -90,6 +99,7 @@ _ENDINGS = {
     "_pa": "Pa",
     "_hz": "Hz",
     "_m": "m",
+    "_w": "W",
     "_s": "s",
     "_k": "K",
     "_e": "electrons",

@@ -51,7 +51,7 @@ def beside_truth(solution: Solution, path: Path) -> list[Beside]:
     if solution.pressure_m2_s2 is not None:
         values = truth_at(truth, solution, truth.pressure_m2_s2)
         own = solution.pressure_m2_s2
-        level = own.mean() - values.mean()
+        level = np.nanmean(own - values)
         found.append(("p", "m2 s-2", "kinematic pressure", own, values + level))
     return [Beside(name, unit, label, true, own - true) for name, unit, label, own, true in found]
 
@@ -64,6 +64,7 @@ def scores(solution: Solution, path: Path) -> dict[str, Any]:
 def readings(experiment: Experiment, solution: Solution) -> list[Reading]:
     """What the scene's point sensors measured, beside what was found there. Raises BadInputError."""
     told = []
+    solution = solution.filled()
     for sensors in read_sensors(experiment, experiment.settings.scene):
         columns = [("T", "K", sensors.temperature_k, sensors.temperature_std_k, solution.temperature_k)]
         if solution.velocity_m_s is not None:

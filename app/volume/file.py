@@ -1,7 +1,8 @@
 """Room volumes: the NPZ format of an airflow ground truth (T, p, u on a vertex grid), read strictly.
 
 Arrays are indexed [ix, iy, iz] at vertices x, y, z [m], end planes included. T in K, kinematic p in m2/s2,
-u in m/s with the last axis x, y, z. `meta_json` may describe the case: domain, inlets, outlet, heater, walls.
+u in m/s with the last axis x, y, z. `solid` marks vertices in or on obstacles, where values mean nothing (NaN, too).
+`meta_json` may describe the case: domain, inlets, outlet, heater, walls.
 """
 
 import json
@@ -10,11 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
+from scipy import ndimage
 
 from app.errors import BadInputError
 from app.files.npz import read_npz
 from app.files.reading import reading
+
+Axes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 _REQUIRED = ("x", "y", "z", "T", "p", "u", "T0")
 
@@ -33,6 +37,7 @@ class RoomVolume:
     density_kg_m3: float = 1.2041
     gladstone_dale_m3_kg: float = 2.26e-4
     case: dict[str, Any] = field(default_factory=dict)
+    solid: Bool[np.ndarray, "nx ny nz"] | None = None
     scalars: dict[str, Any] = field(default_factory=dict)
 
 
@@ -65,10 +70,18 @@ def _volume(path: Path, arrays: dict[str, np.ndarray]) -> RoomVolume:
         )
     x, y, z = (np.asarray(arrays[name], np.float64) for name in "xyz")
     shape = tuple(len(axis) if axis.ndim == 1 else -1 for axis in (x, y, z))
+    case = _case(arrays)
+    solid = _solid(arrays, case, (x, y, z))
+    if solid is not None and (solid.shape != shape or solid.all()):
+        raise BadInputError(
+            f"{path}: solid has shape {solid.shape} and marks {int(solid.sum())} vertices; expected {shape}, "
+            "and some vertices of air. Export the volume again."
+        )
     for name, expected in (("T", shape), ("p", shape), ("u", (*shape, 3))):
         if arrays[name].shape != expected:
             raise BadInputError(f"{path}: {name} has shape {arrays[name].shape}; expected {expected}.")
-        if not np.isfinite(arrays[name]).all():
+        air = np.asarray(arrays[name])[~solid] if solid is not None and solid.shape == shape else arrays[name]
+        if not np.isfinite(air).all():
             raise BadInputError(f"{path}: {name} holds values that are not finite; export the volume again.")
     for name, axis in zip("xyz", (x, y, z), strict=True):
         if len(axis) < 2 or not np.isfinite(axis).all() or np.any(np.diff(axis) <= 0):
@@ -76,9 +89,10 @@ def _volume(path: Path, arrays: dict[str, np.ndarray]) -> RoomVolume:
                 f"{path}: the coordinates {name} do not increase, so the box has no volume; "
                 "expected at least two increasing values in metres."
             )
+    if solid is not None:
+        arrays = arrays | {name: filled(np.asarray(arrays[name]), solid) for name in ("T", "p", "u")}
     _check_temperature(path, "T", arrays["T"])
     _check_temperature(path, "T0", arrays["T0"])
-    case = _case(arrays)
     scalars = {k: v.item() for k, v in arrays.items() if v.ndim == 0 and v.dtype.kind in "fiu"}
     return RoomVolume(
         x_m=x,
@@ -91,8 +105,31 @@ def _volume(path: Path, arrays: dict[str, np.ndarray]) -> RoomVolume:
         density_kg_m3=float(arrays.get("rho0", 1.2041)),
         gladstone_dale_m3_kg=float(arrays.get("G", 2.26e-4)),
         case=case,
+        solid=solid,
         scalars=scalars,
     )
+
+
+def filled(
+    field: Float[np.ndarray, "nx ny nz ..."], solid: Bool[np.ndarray, "nx ny nz"]
+) -> Float[np.ndarray, "nx ny nz ..."]:
+    """The field with the nearest air's values in solid vertices."""
+    places = ndimage.distance_transform_edt(solid, return_distances=False, return_indices=True)
+    return field[tuple(places)]
+
+
+def _solid(arrays: dict[str, np.ndarray], case: dict[str, Any], axes_m: Axes) -> np.ndarray | None:
+    """Vertices in or on obstacles: as the volume marks them, else by the obstacles' boxes; None without any."""
+    if "solid" in arrays:
+        return np.asarray(arrays["solid"], bool)
+    inside = np.zeros([len(axis) for axis in axes_m], bool)
+    for item in case.get("obstacles", []):
+        spans = [
+            (axis >= low - 1e-5) & (axis <= high + 1e-5)
+            for axis, low, high in zip(axes_m, item["lower"], item["upper"], strict=True)
+        ]
+        inside |= spans[0][:, None, None] & spans[1][None, :, None] & spans[2][None, None, :]
+    return inside if inside.any() else None
 
 
 def _check_temperature(path: Path, name: str, temperature_k: np.ndarray) -> None:

@@ -12,6 +12,7 @@ from app.files.durable import durable_path
 from app.volume.file import RoomVolume
 from core.air import GAS_CONSTANT_DRY_AIR_J_KG_K, Air
 from core.geometry import Box, Optics, Vector2, Vector3, WallName, looking_along_y
+from core.objects import RoomObject
 from core.plan.print_choice import suited_print
 from core.scene import (
     BoundaryInformation,
@@ -93,6 +94,7 @@ def room_scene(volume: RoomVolume, options: RigOptions, information: Information
         views=(View(camera=camera, noise=noise, frames=options.frames),),
         light=_light(room, camera, options),
         boundary=tuple(known_boundary(volume, information)),
+        objects=room_objects(volume),
     )
 
 
@@ -101,6 +103,31 @@ def room_box(volume: RoomVolume) -> Box:
     axes = (volume.x_m, volume.y_m, volume.z_m)
     x, y, z = ((_round(axis[0]), _round(axis[-1])) for axis in axes)
     return Box(lower_m=(x[0], y[0], z[0]), upper_m=(x[1], y[1], z[1]))
+
+
+def room_objects(volume: RoomVolume) -> tuple[RoomObject, ...]:
+    """What stands in the room, as the volume's case lists it: everybody in the room sees that."""
+    return tuple(_object(item, volume) for item in volume.case.get("obstacles", []))
+
+
+def _object(item: dict[str, Any], volume: RoomVolume) -> RoomObject:
+    room = room_box(volume)
+    lower, upper = (
+        [
+            min(max(_round(v), low), high)
+            for v, low, high in zip(item[key], room.lower_m, room.upper_m, strict=True)
+        ]
+        for key in ("lower", "upper")
+    )
+    kind = item.get("thermal", "adiabatic")
+    return RoomObject(
+        name=str(item["name"]),
+        lower_m=(lower[0], lower[1], lower[2]),
+        upper_m=(upper[0], upper[1], upper[2]),
+        thermal=kind,
+        temperature_k=float(item["temperature_K"]) if kind == "temperature" else None,
+        power_w=float(item["power_W"]) if kind == "power" else None,
+    )
 
 
 def known_boundary(volume: RoomVolume, information: Information) -> list[BoundaryInformation]:

@@ -9,8 +9,8 @@ from scipy.interpolate import RegularGridInterpolator
 
 from app.experiment.folder import open_experiment, read_manifest
 from app.experiment.results import read_result
-from app.volume.file import RoomVolume, read_volume
-from core.metrics import inner, score_pressure, score_temperature, score_velocity
+from app.volume.file import RoomVolume, filled, read_volume
+from core.metrics import inner, mean_of_air, score_pressure, score_temperature, score_velocity
 from core.result import Solution
 
 # A 95 % interval.
@@ -38,22 +38,23 @@ def score_experiment(folder: Path, truth_path: Path, result: Path | None = None)
 
 
 def score_solution(solution: Solution, truth: RoomVolume) -> dict[str, Any]:
-    """T, u, p scores at the truth's vertices; u and p are None where the solution has none."""
+    """T, u, p scores at the truth's vertices of air; u and p are None where the solution has none."""
+    true_k, true_m_s, true_p = (
+        in_air(truth, v) for v in (truth.temperature_k, truth.velocity_m_s, truth.pressure_m2_s2)
+    )
     temperature = values_at(truth, solution, solution.temperature_k)
     scores: dict[str, Any] = {
-        "T": score_temperature(temperature, truth.temperature_k, truth.ambient_k),
+        "T": score_temperature(temperature, true_k, truth.ambient_k),
         "u": None,
         "p": None,
     }
     if solution.velocity_m_s is not None:
         supply = max((abs(i["U"]) for i in truth.case.get("inlets", [])), default=0.0)
         supply = supply or float(np.linalg.norm(truth.velocity_m_s, axis=-1).max())
-        scores["u"] = score_velocity(
-            values_at(truth, solution, solution.velocity_m_s), truth.velocity_m_s, supply
-        )
+        scores["u"] = score_velocity(values_at(truth, solution, solution.velocity_m_s), true_m_s, supply)
     if solution.pressure_m2_s2 is not None:
         scores["p"] = score_pressure(
-            values_at(truth, solution, solution.pressure_m2_s2), truth.pressure_m2_s2
+            in_air(truth, values_at(truth, solution, solution.pressure_m2_s2)), true_p
         )
     return scores
 
@@ -64,9 +65,10 @@ def coverage(solution: Solution, truth: RoomVolume) -> dict[str, float | None]:
     def within(found: Any, std: Any, values: np.ndarray, *, level: bool = True) -> float | None:
         if found is None or std is None:
             return None
-        error = inner(values_at(truth, solution, found)) - inner(values)
-        error = error if level else error - error.mean()
-        return float(np.mean(np.abs(error) <= _SIGMAS * inner(values_at(truth, solution, std))))
+        error = inner(values_at(truth, solution, found)) - inner(in_air(truth, values))
+        error = error if level else error - mean_of_air(error)
+        held = np.abs(error) <= _SIGMAS * inner(values_at(truth, solution, std))
+        return float(np.mean(held[~np.isnan(error)]))
 
     s = solution
     return {
@@ -76,8 +78,21 @@ def coverage(solution: Solution, truth: RoomVolume) -> dict[str, float | None]:
     }
 
 
+def in_air(truth: RoomVolume, values: np.ndarray) -> np.ndarray:
+    """Values on the truth's vertices, NaN in and on its obstacles."""
+    if truth.solid is None:
+        return values
+    solid = truth.solid if values.ndim == 3 else truth.solid[..., None]
+    return np.where(solid, np.nan, values)
+
+
 def values_at(truth: RoomVolume, solution: Solution, values: np.ndarray) -> np.ndarray:
-    """The solution's values at the truth's vertices (trilinear; the nearest wall outside the box)."""
+    """The solution's values at the truth's vertices (trilinear; the nearest wall outside the box).
+
+    Where the solution has no air, NaN, the nearest air's values are taken: what counts is where the truth has air.
+    """
+    unknown = np.isnan(values if values.ndim == 3 else values[..., 0])
+    values = filled(values, unknown) if unknown.any() else values
     axes = (solution.x_m, solution.y_m, solution.z_m)
     points = [
         np.clip(axis, own[0], own[-1])

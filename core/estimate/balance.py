@@ -1,4 +1,4 @@
-"""The heat balance of the room: the supply brings heat; the outlets and the walls take it away.
+"""The heat balance of the room: supply and objects bring heat; the outlets and the walls take it away.
 
 With a thermometer in the air that leaves, the balance gives one number that nobody can state: the heat coefficient
 that all walls share or, where walls are unknown, the temperature that they share.
@@ -12,6 +12,7 @@ from core.known import leaving_excess_k
 from core.problem import Problem
 from core.room.boundary_conditions import RoomLayout
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
+from core.scene import Scene
 
 
 def free_walls_k(
@@ -30,7 +31,7 @@ def free_walls_k(
     if free.sum() == 0:
         return 0.0, 0.0
     inside = _room_excess_k(problem, leaving)
-    brought = float(np.dot(supply_m3_s(layout), inlet_excess_k - leaving))
+    brought = float(np.dot(supply_m3_s(layout), inlet_excess_k - leaving)) + objects_k_m3_s(problem.scene)
     known = NOMINAL_HEAT_M_S * float(((areas - free) * (inside - wall_excess_k)).sum())
     apart = (brought - known) / (NOMINAL_HEAT_M_S * float(free.sum()))
     contrast = max(float(np.abs(inlet_excess_k).max()), abs(inside))
@@ -56,6 +57,11 @@ def supply_m3_s(layout: RoomLayout) -> Float[np.ndarray, " inlets"]:
     )
 
 
+def objects_k_m3_s(scene: Scene) -> float:
+    """The stated heat of all objects, over rho c."""
+    return sum((item.power_w or 0.0 for item in scene.objects), start=0.0) / scene.air.heat_capacity_j_m3_k
+
+
 def heat_balance_m_s(
     problem: Problem, layout: RoomLayout, inlet_excess_k: np.ndarray, wall_excess_k: np.ndarray
 ) -> float | None:
@@ -65,9 +71,10 @@ def heat_balance_m_s(
     """
     leaving = leaving_excess_k(problem)
     areas = _heated_areas_m2(layout)
-    if leaving is None or not layout.inlets or layout.heaters or areas.sum() == 0:
+    warm = layout.heaters or any(item.thermal == "temperature" for item in layout.objects)
+    if leaving is None or not layout.inlets or warm or areas.sum() == 0:
         return None
-    brought = float(np.dot(supply_m3_s(layout), inlet_excess_k - leaving))
+    brought = float(np.dot(supply_m3_s(layout), inlet_excess_k - leaving)) + objects_k_m3_s(problem.scene)
     inside = _room_excess_k(problem, leaving)
     lost = float((areas * (inside - wall_excess_k)).sum())
     # If heat would have to flow from cold to warm, something else is missing, and the balance tells nothing.

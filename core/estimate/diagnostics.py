@@ -14,6 +14,7 @@ from core.scene import Heater, Inlet
 
 # In one room of twenty an entry is called wrong that is as right as it was stated to be.
 _FALSE_ALARMS = 0.05
+_INTERVAL = 1.96
 # Missing heat is reported above this share of the heat that the supplies bring.
 _MISSING_SHARE = 0.1
 # The velocity is called doubtful if more than this share of the shifts (rms) is unexplained.
@@ -57,6 +58,7 @@ def contradictions(
         elif (name := f"heater_excess_k[{n}]") in believed:
             where = f"the heater on {heater.patch.wall}"
             said.append(_warmer(where, by_k, heater.temperature_k, believed[name]))
+    said += objects_heat(problem, prior, posterior, believed)
     if "log_closure" in believed:
         said.append(
             f"The measurements ask for {float(np.exp(fitted.log_closure)):.2f} times the closure's eddy "
@@ -74,6 +76,28 @@ def _warmer(where: str, by_k: float, entered_k: float, times: float) -> str:
 
 def _evidence(times: float) -> str:
     return f"{times:.1f} times what the entry and the model may be wrong by"
+
+
+def objects_heat(
+    problem: Problem, prior: Prior, posterior: Posterior, believed: dict[str, float]
+) -> list[str]:
+    """The fitted heat of each object of stated power, with its 95 % interval."""
+    fitted = prior.parameters(posterior.vector)
+    own = dict(zip(prior.names(), np.sqrt(np.diag(posterior.covariance)), strict=True))
+    said = []
+    for n, item in enumerate(problem.scene.objects):
+        name = f"object_power_w[{n}]"
+        if name not in own:
+            continue
+        watts, spread = float(fitted.object_power_w[n]), _INTERVAL * item.power_std_w * float(own[name])
+        text = (
+            f"The object {item.name!r} gives {watts:.0f} W to the air (95 %: {watts - spread:.0f} to "
+            f"{watts + spread:.0f} W; entered: {item.power_w:.0f} W)."
+        )
+        said.append(
+            text + (f" It was moved {_evidence(believed[name])}. Check it." if name in believed else "")
+        )
+    return said
 
 
 def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
@@ -135,15 +159,18 @@ def balances(
     inflow_m3_s = float(inflows_m3_s.sum())
     if inflow_m3_s <= 0:
         return []
-    capacity_w_m3_k = problem.scene.air.density_kg_m3 * 1006.0
+    capacity_w_m3_k = problem.scene.air.heat_capacity_j_m3_k
     brought = capacity_w_m3_k * float(np.dot(inflows_m3_s, np.asarray(parameters.inlet_excess_k)))
+    by_objects = float(parameters.object_power_w.sum())
     carried = capacity_w_m3_k * inflow_m3_s * outflow_excess_k
+    added = f", objects give {by_objects:.0f} W" if problem.scene.objects else ""
     said = [
-        f"Supply air brings {brought:.0f} W above ambient; {carried:.0f} W leave by the outlets and "
-        f"{brought - carried:.0f} W through walls and heaters. {3600 * inflow_m3_s:.0f} m3/h flow through."
+        f"Supply air brings {brought:.0f} W above ambient{added}; {carried:.0f} W leave by the outlets and "
+        f"{brought + by_objects - carried:.0f} W through walls and heaters. {3600 * inflow_m3_s:.0f} m3/h flow "
+        "through."
     ]
     missing = capacity_w_m3_k * held_k_m3_s
-    if abs(missing) > _MISSING_SHARE * abs(brought):
+    if abs(missing) > _MISSING_SHARE * (abs(brought) + abs(by_objects)):
         said.append(
             f"To hold the measured temperatures the fitted room needs {abs(missing):.0f} W "
             f"{'more' if missing > 0 else 'less'} than supply, heaters and walls give it: a source, a leak or a "

@@ -14,6 +14,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float
 
+from core.air import Air
 from core.estimate.balance import (
     free_walls_k,
     heat_balance_m_s,
@@ -24,7 +25,7 @@ from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomLayout, RoomParameters, SuspectedHeater
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
-from core.scene import Heater, Inlet
+from core.scene import Heater, Inlet, Scene
 
 # Walls' heat coefficients are known within a factor of two: one sigma is 0.6 in the logarithm.
 _WALL_HEAT_STD = 0.6
@@ -61,6 +62,7 @@ class Prior(eqx.Module):
     std: RoomParameters
     supply_m3_s: Float[np.ndarray, " inlets"]
     leaving_excess_k: float | None = eqx.field(static=True)
+    heat_capacity_j_m3_k: float = eqx.field(static=True, default=Air().heat_capacity_j_m3_k)
 
     def active(self) -> np.ndarray:
         """Indices of the fitted parameters in the flattened vector."""
@@ -93,7 +95,7 @@ class Prior(eqx.Module):
         return eqx.tree_at(lambda p: p.wall_log_heat, found, moved)
 
     def _balanced(self, found: RoomParameters) -> float:
-        """Logarithm of the heat that the supply brings beyond the outflow's, over the same as stated."""
+        """Logarithm of the heat that supply and objects bring beyond the outflow's, over the same as stated."""
         if self.leaving_excess_k is None:
             return 0.0
         flow = self.supply_m3_s * np.exp(np.asarray(found.inlet_log_flow, float))
@@ -101,6 +103,8 @@ class Prior(eqx.Module):
         stated = float(
             np.dot(self.supply_m3_s, np.asarray(self.mean.inlet_excess_k, float) - self.leaving_excess_k)
         )
+        brought += float(found.object_power_w.sum()) / self.heat_capacity_j_m3_k
+        stated += float(self.mean.object_power_w.sum()) / self.heat_capacity_j_m3_k
         return float(np.log(np.clip(brought / stated, 0.25, 4.0))) if brought * stated > 0 else 0.0
 
     def names(self) -> list[str]:
@@ -158,6 +162,7 @@ def room_prior(
         jnp.full(len(heaters), np.log(_HEATER_HEAT_M_S)),
         jnp.float32(0.0),
         jnp.zeros((3, 3, 4)),
+        *object_means(scene),
     )
     simple = scene.flow.transport in ("given", "zero_equation")
     if log_viscosity_std is None:
@@ -173,9 +178,30 @@ def room_prior(
         _f32([_HEATER_HEAT_STD * (not isinstance(h, SuspectedHeater)) for h in heaters]),
         jnp.float32(_SIMPLE_CLOSURE_STD if simple else _CLOSURE_STD),
         jnp.full((3, 3, 4), log_viscosity_std),
+        *object_deviations(scene),
     )
     leaving = None if balanced is None else leaving_excess_k(problem)
-    return Prior(mean, std, supply_m3_s(layout), leaving)
+    return Prior(mean, std, supply_m3_s(layout), leaving, scene.air.heat_capacity_j_m3_k)
+
+
+def object_means(scene: Scene) -> tuple[Array, Array, Array]:
+    """Power [W], excess temperature [K] and logarithm of the heat coefficient of every object, as stated."""
+    ambient = scene.air.ambient_temperature_k
+    return (
+        _f32([item.power_w or 0.0 for item in scene.objects]),
+        _f32([(item.temperature_k or ambient) - ambient for item in scene.objects]),
+        _f32([np.log(_HEATER_HEAT_M_S) for _ in scene.objects]),
+    )
+
+
+def object_deviations(scene: Scene) -> tuple[Array, Array, Array]:
+    """Their deviations; 0 for what an object does not state."""
+    held = [float(item.thermal == "temperature") for item in scene.objects]
+    return (
+        _f32([item.power_std_w * (item.thermal == "power") for item in scene.objects]),
+        _f32([item.temperature_std_k * h for item, h in zip(scene.objects, held, strict=True)]),
+        _f32([_HEATER_HEAT_STD * h for h in held]),
+    )
 
 
 def _f32(values: object) -> Float[Array, "..."]:

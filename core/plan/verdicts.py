@@ -1,18 +1,43 @@
 """Verdicts in words: what this rig can see, and what would help where it cannot."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from core.plan.choice import Choice
 from core.plan.expected import ExpectedFlow
 from core.plan.observability import Seen
 from core.plan.signal import VISIBLE, Signal, lever_m
+from core.rays.visibility import hidden_by_objects, sees_wall
 from core.scene import ProjectedPattern, Scene
 
 _SAME_PLACE_M = 0.01
+# Places of the picture, an axis, where the wall is looked for; a share of the wall that is much to hide.
+_PROBES, _TOO_MUCH = 64, 0.4
 
 
 def verdict(scene: Scene, view: int, flow: ExpectedFlow, found: Signal, other_p99_px: float) -> str:
-    """One view's sentence: visible or not, and what it would need."""
+    """One view's sentences: visible or not, what it would need, and how much of the wall objects hide."""
+    return _verdict(scene, view, flow, found, other_p99_px) + hidden_wall(scene, view, found.noise.window_px)
+
+
+def hidden_wall(scene: Scene, view: int, window_px: int) -> str:
+    """A sentence on the share of the wall that objects hide from this view; empty where they hide none."""
+    camera = scene.views[view].camera
+    columns, rows = (np.linspace(0, n - 1, _PROBES) for n in (camera.width_px, camera.height_px))
+    pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    on_wall = sees_wall(replace(scene, objects=()), view, pixels, margin_px=float(window_px))
+    hidden = on_wall & hidden_by_objects(scene, view, pixels, margin_px=float(window_px))
+    share = hidden.sum() / max(on_wall.sum(), 1)
+    if share == 0:
+        return ""
+    said = f" Objects hide {100 * share:.0f} % of the wall, and nothing is measured there."
+    if share > _TOO_MUCH:
+        said += " That is much: move the camera, or what stands before the wall, to see more of it."
+    return said
+
+
+def _verdict(scene: Scene, view: int, flow: ExpectedFlow, found: Signal, other_p99_px: float) -> str:
     name, frames = scene.views[view].name, scene.views[view].frames
     size = found.shift.percentile_px(99)
     if not np.isfinite(found.noise.mean_px):

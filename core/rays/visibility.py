@@ -5,8 +5,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from core.objects import RoomObject
 from core.rays.optics import pinhole
-from core.scene import Scene
+from core.scene import ProjectedPattern, Scene
+
+# Air so near to an object is in a layer that a room's grid does not resolve: rays through it are left out.
+_SKIN_M = 0.05
 
 
 def sees_wall(
@@ -14,20 +18,79 @@ def sees_wall(
 ) -> Bool[np.ndarray, " points"]:
     """Whether pixels (column, row) see the back wall at least `margin_px` inside its edges.
 
-    A negative margin asks for the wall and a strip around it.
+    A negative margin asks for the wall and a strip around it. Else what an object hides is not seen, and no ray
+    passes an object by less than the margin.
     """
     point, range_m = _on_the_wall(scene, view, pixels)
-    return _inside(
+    inside = _inside(
         scene, point, margin_px * range_m / min(scene.views[view].camera.focal_px) * np.ones((2, 1))
     )
+    return inside if margin_px < 0 else inside & ~hidden_by_objects(scene, view, pixels, margin_px)
+
+
+def hidden_by_objects(
+    scene: Scene, view: int, pixels: Float[np.ndarray, "points 2"], margin_px: float
+) -> Bool[np.ndarray, " points"]:
+    """Whether an object stands between the camera and the back wall, or in the projector's light to that point.
+
+    `margin_px`: objects count as so much larger, as the camera sees that length on the wall.
+    """
+    hidden = np.zeros(len(pixels), bool)
+    if scene.objects:
+        margin_m = margin_px * _least_range_m(scene, view) / min(scene.views[view].camera.focal_px)
+        hidden = _behind_objects(scene, view, pixels, margin_m)
+    return hidden
 
 
 def away_from_walls(
     scene: Scene, view: int, pixels: Float[np.ndarray, "points 2"], share: float
 ) -> Bool[np.ndarray, " points"]:
-    """Whether pixels see the back wall at least `share` of the room's size inside its edges."""
+    """Whether pixels see the back wall at least `share` of the room's size inside its edges, and past objects."""
     size_m = np.asarray(scene.room.size_m)[[0, 2]]
-    return _inside(scene, _on_the_wall(scene, view, pixels)[0], share * size_m[:, None])
+    inside = _inside(scene, _on_the_wall(scene, view, pixels)[0], share * size_m[:, None])
+    return inside & ~_behind_objects(scene, view, pixels, _SKIN_M) if scene.objects else inside
+
+
+def _least_range_m(scene: Scene, view: int) -> float:
+    return scene.room.upper_m[1] - scene.views[view].camera.position_m[1]
+
+
+def _behind_objects(
+    scene: Scene, view: int, pixels: Float[np.ndarray, "points 2"], margin_m: float
+) -> Bool[np.ndarray, " points"]:
+    point_m, _ = _on_the_wall(scene, view, pixels)
+    lights_m = [scene.views[view].camera.position_m]
+    if isinstance(scene.light, ProjectedPattern):
+        lights_m.append(scene.light.projector.position_m)
+    hidden = np.zeros(len(pixels), bool)
+    for item in scene.objects:
+        for from_m in lights_m:
+            hidden |= np.isfinite(first_hit(item, np.array(from_m, float), point_m, margin_m))
+    return hidden
+
+
+def wall_points(
+    scene: Scene, view: int, pixels: Float[np.ndarray, "points 2"]
+) -> Float[np.ndarray, "points 3"]:
+    """Where each pixel looks on the plane of the back wall [m]; NaN where it looks away."""
+    return _on_the_wall(scene, view, pixels)[0]
+
+
+def first_hit(
+    item: RoomObject,
+    from_m: Float[np.ndarray, "3"],
+    to_m: Float[np.ndarray, "points 3"],
+    margin_m: float = 0.0,
+) -> Float[np.ndarray, " points"]:
+    """Where the way from one point to others enters an object, as a share of the way; NaN where it does not."""
+    way = to_m - from_m
+    way = np.where(np.abs(way) < 1e-12, 1e-12, way)
+    low = (np.array(item.lower_m) - margin_m - from_m) / way
+    high = (np.array(item.upper_m) + margin_m - from_m) / way
+    enters, leaves = np.minimum(low, high).max(axis=1), np.maximum(low, high).min(axis=1)
+    # A thing against the wall still hides it.
+    met = (enters < leaves) & (leaves > 0.0) & (enters < 1.0)
+    return np.where(met, enters, np.nan)
 
 
 def _on_the_wall(

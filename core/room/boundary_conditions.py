@@ -10,10 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from core.geometry import WALLS
+from core.air import Air
+from core.geometry import WALLS, face_of
 from core.known import refuse_outward, refuse_overlaps, stated_walls
+from core.objects import RoomObject
 from core.room.openings import Opening, lay_patch, supply_turbulence
 from core.room.room_grid import AXES, RoomGrid
+from core.room.solids import Solids, SurfaceHeat, lay_objects
 from core.room.wall_planes import Boundary, WallPlane, closed_wall
 from core.scene import Heater, Inlet, Outlet, Scene
 from core.setting import SettingError
@@ -28,7 +31,8 @@ class RoomParameters(eqx.Module):
 
     `inlet_log_flow` is a factor on the stated velocity. `wall_log_heat` and `heater_log_heat` are heat coefficients
     [m/s]; `log_heat` is a factor on those of all walls. `log_closure` is a factor on the eddy viscosity, and
-    `log_viscosity` one that varies over the room on a coarse lattice.
+    `log_viscosity` one that varies over the room on a coarse lattice. An object of stated power has `object_power_w`;
+    one of stated temperature `object_excess_k` and the heat coefficient `object_log_heat` [m/s].
     """
 
     inlet_excess_k: Float[Array, " inlets"]
@@ -40,13 +44,17 @@ class RoomParameters(eqx.Module):
     heater_log_heat: Float[Array, " heaters"]
     log_closure: Float[Array, ""]
     log_viscosity: Float[Array, "3 3 4"]
+    object_power_w: Float[Array, " objects"] = eqx.field(default_factory=lambda: jnp.zeros(0))
+    object_excess_k: Float[Array, " objects"] = eqx.field(default_factory=lambda: jnp.zeros(0))
+    object_log_heat: Float[Array, " objects"] = eqx.field(default_factory=lambda: jnp.zeros(0))
 
 
 class RoomLayout(eqx.Module):
     """Where openings and heaters are, what is stated about them, and sentences on what the grid cannot hold.
 
     `shown`: whether vertices on a heater get its temperature. `heated`, `no_slip`, `held`: of each wall, 1 if heat
-    passes it, if air sticks to it, and if its temperature is stated.
+    passes it, if air sticks to it, and if its temperature is stated. `solids` are the objects in the room, and
+    `objects` those of the scene; None and empty where there are none.
     """
 
     grid: RoomGrid
@@ -60,6 +68,9 @@ class RoomLayout(eqx.Module):
     no_slip: Float[np.ndarray, "6"]
     held: Float[np.ndarray, "6"]
     notes: tuple[str, ...] = eqx.field(static=True)
+    objects: tuple[RoomObject, ...] = eqx.field(static=True, default=())
+    solids: Solids | None = None
+    heat_capacity_j_m3_k: float = eqx.field(static=True, default=Air().heat_capacity_j_m3_k)
 
     def inflow_m3_s(self, parameters: RoomParameters) -> Float[Array, " inlets"]:
         """Volume flow of every inlet."""
@@ -93,6 +104,9 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
     place = [
         [lay_patch(b.patch, scene.room, grid, notes) for b in kind] for kind in (inlets, outlets, heaters)
     ]
+    solids = lay_objects(scene.objects, grid, notes)
+    for kind, opening in (*(("inlet", o) for o in place[0]), *(("outlet", o) for o in place[1])):
+        _refuse_covered(kind, opening, solids, grid)
     stated = [walls[name] for name in WALLS]
     heated = np.array([float(wall is None or wall.thermal != "adiabatic") for wall in stated])
     no_slip = np.array([float(wall is None or wall.no_slip) for wall in stated])
@@ -109,6 +123,9 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
         no_slip,
         held,
         tuple(notes),
+        scene.objects,
+        solids,
+        scene.air.heat_capacity_j_m3_k,
     )
 
 
@@ -126,8 +143,47 @@ def boundary(layout: RoomLayout, parameters: RoomParameters) -> Boundary:
         planes[opening.wall] = eqx.tree_at(
             lambda w: w.normal_m_s, wall, wall.normal_m_s - opening.inward * speed * fraction
         )
+    solids = _heated(layout, parameters)
+    if solids is not None:
+        planes = [_behind(plane, wall, solids) for wall, plane in enumerate(planes)]
     x, y, z = ((planes[2 * a], planes[2 * a + 1]) for a in AXES)
-    return Boundary((x, y, z))
+    return Boundary((x, y, z), solids)
+
+
+def _heated(layout: RoomLayout, parameters: RoomParameters) -> Solids | None:
+    """The objects with their heat: power spread evenly over the faces in air, or h (T_surface - T)."""
+    solids = layout.solids
+    if solids is None:
+        return None
+    area_m2 = np.bincount(solids.owner, weights=solids.area_m2, minlength=len(layout.objects))
+    power = np.array([item.thermal == "power" for item in layout.objects], np.float32)
+    held = np.array([item.thermal == "temperature" for item in layout.objects], np.float32)
+    share = power / (layout.heat_capacity_j_m3_k * np.maximum(area_m2, 1e-9)).astype(np.float32)
+    heat = SurfaceHeat(
+        (parameters.object_power_w * share)[solids.owner],
+        (jnp.exp(parameters.object_log_heat) * held)[solids.owner],
+        parameters.object_excess_k[solids.owner],
+    )
+    return eqx.tree_at(lambda s: s.heat, solids, heat)
+
+
+def _behind(plane: WallPlane, wall: int, solids: Solids) -> WallPlane:
+    """The wall without heat where an object stands against it."""
+    face = face_of(WALLS[wall])
+    air = jnp.take(solids.air, jnp.array(face.end), axis=face.axis)
+    return eqx.tree_at(lambda w: w.conductance_m_s, plane, plane.conductance_m_s * air)
+
+
+def _refuse_covered(kind: str, opening: Opening, solids: Solids | None, grid: RoomGrid) -> None:
+    if solids is None:
+        return
+    face = face_of(WALLS[opening.wall])
+    solid = np.take(np.asarray(solids.air), face.end, axis=face.axis) == 0
+    if (solid & (opening.fraction > 0)).any():
+        raise SettingError(
+            f"An object covers cells of the {kind} on {WALLS[opening.wall]}, on the grid of "
+            f"{' x '.join(map(str, grid.cells))} cells. Move it a little farther from the opening."
+        )
 
 
 def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlane:

@@ -9,15 +9,27 @@ and on the walls. k-epsilon has no buoyancy term in the equations of k and epsil
 """
 
 import abc
+from typing import cast
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
+from scipy import ndimage
 
 from core.air import Air
-from core.room.k_epsilon import C_MU, KEpsilonState, advance, energy_walls, heat_walls
+from core.room.k_epsilon import (
+    C_MU,
+    KEpsilonState,
+    advance,
+    energy_viscosity,
+    energy_walls,
+    heat_ratio,
+    heat_walls,
+)
 from core.room.momentum import Viscosity
 from core.room.room_grid import AXES, Cells, RoomGrid, Velocity, face_mean, first_plane, last_plane
+from core.room.solids import Faces, Solids
 from core.room.wall_planes import Boundary, Plane
 
 
@@ -47,6 +59,14 @@ class AbstractClosure(eqx.Module):
     def wall_heat(self, state: KEpsilonState | None, grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
         """Factors on the walls' conductances, (low, high) for each axis."""
 
+    @abc.abstractmethod
+    def object_viscosity_m2_s(self, state: KEpsilonState | None, cells_m2_s: Cells, solids: Solids) -> Faces:
+        """Viscosity on the objects' faces, from that in the cells."""
+
+    @abc.abstractmethod
+    def object_heat(self, state: KEpsilonState | None, solids: Solids) -> Faces:
+        """Factors on the objects' conductances."""
+
 
 class AbstractAlgebraicClosure(AbstractClosure):
     """A closure without a state of its own: its viscosity follows from the velocity, its walls are as stated."""
@@ -69,6 +89,14 @@ class AbstractAlgebraicClosure(AbstractClosure):
     def wall_heat(self, state: KEpsilonState | None, grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
         """The stated conductances."""
         return _even_walls(grid)
+
+    def object_viscosity_m2_s(self, state: KEpsilonState | None, cells_m2_s: Cells, solids: Solids) -> Faces:
+        """That of the air beside."""
+        return solids.next_air(cells_m2_s)
+
+    def object_heat(self, state: KEpsilonState | None, solids: Solids) -> Faces:
+        """The stated conductances."""
+        return jnp.ones_like(solids.centre_m)
 
 
 class ConstantClosure(AbstractAlgebraicClosure):
@@ -134,15 +162,34 @@ class KEpsilonClosure(AbstractClosure):
             return _even_walls(grid)
         return heat_walls(state.energy_m2_s2, grid, self.molecular_m2_s, self.prandtl)
 
+    def object_viscosity_m2_s(self, state: KEpsilonState | None, cells_m2_s: Cells, solids: Solids) -> Faces:
+        """The log law."""
+        if state is None:
+            return solids.next_air(cells_m2_s)
+        return energy_viscosity(solids.next_air(state.energy_m2_s2), solids.centre_m, self.molecular_m2_s)
 
-def wall_distance_m(grid: RoomGrid) -> Cells:
-    """Distance of each cell centre to the nearest wall of the box."""
+    def object_heat(self, state: KEpsilonState | None, solids: Solids) -> Faces:
+        """The wall function's heat coefficient over the nominal one."""
+        if state is None:
+            return jnp.ones_like(solids.centre_m)
+        beside = solids.next_air(state.energy_m2_s2)
+        return heat_ratio(beside, solids.centre_m, self.molecular_m2_s, self.prandtl)
+
+
+def wall_distance_m(grid: RoomGrid, solids: Solids | None = None) -> Cells:
+    """Distance of each cell centre to the nearest wall of the box, or object."""
     distance = jnp.full(grid.cells, jnp.inf, jnp.float32)
     for a in AXES:
         centres = (jnp.arange(grid.cells[a], dtype=jnp.float32) + 0.5) * grid.spacing_m[a]
         nearest = jnp.minimum(centres, grid.cells[a] * grid.spacing_m[a] - centres)
         distance = jnp.minimum(distance, nearest.reshape([-1 if b == a else 1 for b in AXES]))
-    return distance
+    if solids is None:
+        return distance
+    to_centre_m = cast(
+        "np.ndarray", ndimage.distance_transform_edt(np.asarray(solids.air), sampling=grid.spacing_m)
+    )
+    to_face_m = np.maximum(to_centre_m - 0.5 * min(grid.spacing_m), 0.0)
+    return jnp.minimum(distance, jnp.asarray(to_face_m, jnp.float32))
 
 
 def _even_walls(grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:

@@ -74,7 +74,7 @@ class Room(eqx.Module):
         molecular = jnp.float32(self.scene.air.kinematic_viscosity_m2_s)
         flow = self.scene.flow
         if self.closure == "zero_equation":
-            return ZeroEquationClosure(wall_distance_m(self.grid), scale, molecular)
+            return ZeroEquationClosure(wall_distance_m(self.grid, self.layout.solids), scale, molecular)
         if self.closure == "constant":
             area = (
                 sum(o.area_m2 for o in self.layout.inlets)
@@ -101,11 +101,15 @@ def room(scene: Scene, cells: int, closure: str) -> Room:
 
 
 def _plume_speed_m_s(scene: Scene) -> float:
-    """A tenth of the free-fall speed of the largest stated contrast over the room's height."""
+    """A tenth of the free-fall speed of the largest stated contrast over the room's height, or a plume's speed."""
     ambient = scene.air.ambient_temperature_k
-    stated = [getattr(part, "temperature_k", None) for part in scene.boundary]
+    stated = [getattr(part, "temperature_k", None) for part in (*scene.boundary, *scene.objects)]
     contrast = max([abs(t - ambient) for t in stated if t is not None] + [0.1])
-    return 0.1 * float(np.sqrt(GRAVITY_M_S2 * contrast / ambient * scene.room.size_m[2]))
+    height_m = scene.room.size_m[2]
+    falling = 0.1 * float(np.sqrt(GRAVITY_M_S2 * contrast / ambient * height_m))
+    heat_w = max([abs(item.power_w or 0.0) for item in scene.objects] + [0.0])
+    buoyancy_m4_s3 = GRAVITY_M_S2 / ambient * heat_w / scene.air.heat_capacity_j_m3_k
+    return max(falling, (buoyancy_m4_s3 / height_m) ** (1 / 3))
 
 
 def lattice_to_cells(lattice: Float[Array, "lx ly lz"], grid: RoomGrid) -> Float[Array, "nx ny nz"]:

@@ -25,6 +25,7 @@ from core.room.room_grid import (
     first_plane,
     last_plane,
 )
+from core.room.solids import Solids
 from core.room.transport import add_to_walls, scalar_rate
 from core.room.wall_planes import Boundary
 
@@ -75,6 +76,8 @@ def advance(
     new_k = (k + dt_s * (k_rate + production)) / (1.0 + dt_s * frequency)
     new_e = (epsilon + dt_s * (e_rate + C_1 * production * frequency)) / (1.0 + dt_s * C_2 * frequency)
     new_e = jnp.where(touched > 0, wall_epsilon, new_e)
+    if boundary.solids is not None:
+        new_k, new_e = new_k * boundary.solids.air, new_e * boundary.solids.air
     return KEpsilonState(jnp.maximum(new_k, SMALLEST_K), jnp.maximum(new_e, SMALLEST_EPSILON))
 
 
@@ -114,8 +117,54 @@ def wall_sources(
         production = add_to_walls(production, parts[0][0], parts[1][0], a)
         epsilon = add_to_walls(epsilon, parts[0][1], parts[1][1], a)
         touched = add_to_walls(touched, grips[0], grips[1], a)
+    if boundary.solids is not None:
+        found = _object_sources(k, cells, boundary.solids, molecular_m2_s)
+        touched, production, epsilon = (
+            boundary.solids.added(field, values)
+            for field, values in zip((touched, production, epsilon), found, strict=True)
+        )
     weight = 1.0 / jnp.maximum(touched, 1.0)
     return touched, production * weight, epsilon * weight
+
+
+def _object_sources(
+    k: Cells, cells: list[Float[Array, "..."]], solids: Solids, molecular_m2_s: Float[Array, ""]
+) -> tuple[Float[Array, " faces"], Float[Array, " faces"], Float[Array, " faces"]]:
+    """The same of the objects' faces: 1 for each, production and epsilon in the air beside it."""
+    beside_k, y = solids.next_air(k), solids.centre_m
+    speeds = []
+    for a in AXES:
+        b, c = (cells[other].reshape(-1)[solids.beside[solids.along(a)]] for other in AXES if other != a)
+        speeds.append(jnp.sqrt(b**2 + c**2 + 1e-12))
+    root = jnp.sqrt(beside_k)
+    rate = C_MU**0.25 * root / (KAPPA * y)
+    production = energy_viscosity(beside_k, y, molecular_m2_s) * jnp.concatenate(speeds) / y * rate
+    return jnp.ones_like(y), production, C_MU**0.75 * root**3 / (KAPPA * y)
+
+
+def energy_viscosity(
+    k: Float[Array, "..."], y_m: Float[Array, "..."] | float, molecular_m2_s: Float[Array, ""]
+) -> Float[Array, "..."]:
+    """Viscosity on a wall by the log law, from k at the distance y."""
+    y_plus = C_MU**0.25 * jnp.sqrt(k) * y_m / molecular_m2_s
+    log_law = y_plus * KAPPA / jnp.log(jnp.maximum(WALL_E * y_plus, 2.0))
+    return molecular_m2_s * jnp.where(y_plus > LAMINAR_Y_PLUS, log_law, 1.0)
+
+
+def heat_ratio(
+    k: Float[Array, "..."],
+    y_m: Float[Array, "..."] | float,
+    molecular_m2_s: Float[Array, ""],
+    prandtl: float,
+) -> Float[Array, "..."]:
+    """Heat coefficient of a wall over the nominal one, from k at the distance y (`heat_walls`)."""
+    ratio = prandtl / TURBULENT_PRANDTL
+    sublayer = 9.24 * (ratio**0.75 - 1.0) * (1.0 + 0.28 * np.exp(-0.007 * prandtl / TURBULENT_PRANDTL))
+    friction = C_MU**0.25 * jnp.sqrt(k)
+    y_plus = friction * y_m / molecular_m2_s
+    profile = jnp.log(jnp.maximum(WALL_E * y_plus, 40.0)) / KAPPA + sublayer
+    heat = jnp.maximum(friction / (TURBULENT_PRANDTL * profile), molecular_m2_s / (prandtl * y_m))
+    return jnp.maximum(heat / NOMINAL_HEAT_M_S, 0.5)
 
 
 def energy_walls(
@@ -127,9 +176,7 @@ def energy_walls(
         y = 0.5 * grid.spacing_m[a]
         sides = []
         for nearest in (first_plane, last_plane):
-            y_plus = C_MU**0.25 * jnp.sqrt(nearest(k, a)) * y / molecular_m2_s
-            log_law = y_plus * KAPPA / jnp.log(jnp.maximum(WALL_E * y_plus, 2.0))
-            sides.append(molecular_m2_s * jnp.where(y_plus > LAMINAR_Y_PLUS, log_law, 1.0))
+            sides.append(energy_viscosity(nearest(k, a), y, molecular_m2_s))
         walls.append((sides[0], sides[1]))
     return tuple(walls)
 
@@ -142,18 +189,12 @@ def heat_walls(
     Jayatilleke's wall function; but at least conduction through half a cell, and half of the nominal coefficient.
     A jet along a wall takes up several times the heat of a still corner.
     """
-    ratio = prandtl / TURBULENT_PRANDTL
-    sublayer = 9.24 * (ratio**0.75 - 1.0) * (1.0 + 0.28 * np.exp(-0.007 * prandtl / TURBULENT_PRANDTL))
     walls = []
     for a in AXES:
         y = 0.5 * grid.spacing_m[a]
         sides = []
         for nearest in (first_plane, last_plane):
-            friction = C_MU**0.25 * jnp.sqrt(nearest(k, a))
-            y_plus = friction * y / molecular_m2_s
-            profile = jnp.log(jnp.maximum(WALL_E * y_plus, 40.0)) / KAPPA + sublayer
-            heat = jnp.maximum(friction / (TURBULENT_PRANDTL * profile), molecular_m2_s / (prandtl * y))
-            sides.append(jnp.maximum(heat / NOMINAL_HEAT_M_S, 0.5))
+            sides.append(heat_ratio(nearest(k, a), y, molecular_m2_s, prandtl))
         walls.append((sides[0], sides[1]))
     return tuple(walls)
 

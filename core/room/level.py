@@ -36,6 +36,8 @@ def layer_exchange_m3_s(flow: Flow, model: RoomModel) -> Float[Array, "nz nz"]:
     grid = model.grid
     inner = cut(flow.velocity[2], 1, -1, 2)
     diffusive = face_mean(model.diffusivity_m2_s(model.viscosity(flow)), 2) / grid.spacing_m[2]
+    if model.boundary.solids is not None:
+        diffusive = diffusive * cut(model.boundary.solids.open_faces[2], 1, -1, 2)
     area = grid.face_area_m2(2)
     up = (jnp.maximum(inner, 0.0) + diffusive).sum((0, 1)) * area
     down = (jnp.maximum(-inner, 0.0) + diffusive).sum((0, 1)) * area
@@ -58,4 +60,10 @@ def _lost_m3_s(flow: Flow, model: RoomModel) -> Float[Array, " nz"]:
                 lost = lost.at[0 if side == 0 else -1].add(leaving.sum())
             else:
                 lost = lost + leaving.sum(0)
+    solids = model.boundary.solids
+    if solids is not None:
+        taken = (
+            model.closure.object_heat(flow.turbulence, solids) * solids.heat.conductance_m_s * solids.area_m2
+        )
+        lost = lost + solids.added(jnp.zeros(grid.cells), taken).sum((0, 1))
     return lost

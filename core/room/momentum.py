@@ -18,6 +18,7 @@ from core.room.room_grid import (
     stored,
     within,
 )
+from core.room.solids import Solids
 from core.room.transport import add_to_walls, limited_flux
 from core.room.wall_planes import Boundary, WallPlane
 
@@ -25,10 +26,14 @@ Field = Float[Array, "..."]
 
 
 class Viscosity(eqx.Module):
-    """Effective viscosity in the cells and on the walls (low, high an axis), molecular part included."""
+    """Effective viscosity in the cells and on the walls (low, high an axis), molecular part included.
+
+    `on_objects_m2_s` is that on the objects' faces; None where there are none.
+    """
 
     cells_m2_s: Cells
     walls_m2_s: tuple[tuple[Field, Field], ...]
+    on_objects_m2_s: Field | None = None
 
 
 def momentum_rate(
@@ -50,6 +55,9 @@ def momentum_rate(
         for b in AXES:
             if b != a:
                 rate = add_to_walls(rate, *_friction(velocity[a], viscosity, boundary, (a, b), grid), b)
+        if boundary.solids is not None and viscosity.on_objects_m2_s is not None:
+            drag = _drag_per_s(viscosity.on_objects_m2_s, boundary.solids, a)
+            rate = rate - drag * cut(velocity[a], 1, -1, a)
         rates.append(_with_inlets(rate, boundary.walls[a], a))
     rates[2] = rates[2] + face_mean(buoyancy_m_s2, 2)
     u, v, w = rates
@@ -78,7 +86,19 @@ def _across(
         + difference(velocity[b], a) / grid.spacing_m[a]
     )
     nu = face_mean(face_mean(within(viscosity, tuple(c for c in AXES if c != b)), a), b)
+    if boundary.solids is not None:
+        nu = nu * boundary.solids.open_edges[a][b]
     return difference(nu * strain - flux, b) / grid.spacing_m[b]
+
+
+def _drag_per_s(on_objects_m2_s: Field, solids: Solids, a: int) -> Field:
+    """What slows component a at its inner faces, by the friction of the objects beside them."""
+    drag = jnp.zeros_like(solids.air)
+    for b in AXES:
+        if b != a:
+            faces = solids.along(b)
+            drag = solids.added(drag, on_objects_m2_s[faces] / (2.0 * solids.centre_m[faces] ** 2), faces)
+    return face_mean(drag, a)
 
 
 def _padded(component: Field, boundary: Boundary, a: int, b: int) -> Field:

@@ -6,7 +6,7 @@ from jaxtyping import Float
 
 from core.geometry import WALLS, Box, face_of
 from core.room.k_epsilon import C_MU
-from core.room.room_grid import RoomGrid
+from core.room.room_grid import AXES, RoomGrid
 from core.scene import Inlet, Outlet, Patch, Scene
 from core.setting import SettingError
 
@@ -57,7 +57,7 @@ def lay_patch(patch: Patch, room: Box, grid: RoomGrid, notes: list[str]) -> Open
 
 
 def opening_edges_m(scene: Scene) -> tuple[tuple[float, ...], ...]:
-    """Edges of inlets and outlets along each axis [m]: cell faces there keep a jet's profile at its opening."""
+    """Edges of openings and objects along each axis [m]: cell faces there keep a jet's profile at its opening."""
     edges: tuple[list[float], ...] = ([], [], [])
     for part in scene.boundary:
         if isinstance(part, Inlet | Outlet):
@@ -65,6 +65,9 @@ def opening_edges_m(scene: Scene) -> tuple[tuple[float, ...], ...]:
                 face_of(part.patch.wall).along, part.patch.lower_m, part.patch.upper_m, strict=True
             ):
                 edges[a].extend((low, high))
+    for item in scene.objects:
+        for a in AXES:
+            edges[a].extend((item.lower_m[a], item.upper_m[a]))
     return tuple(tuple(e) for e in edges)
 
 

@@ -16,6 +16,7 @@ from core.air import Air
 from core.room.closure import AbstractClosure
 from core.room.k_epsilon import TURBULENT_PRANDTL, KEpsilonState
 from core.room.momentum import Viscosity, momentum_rate
+from core.room.obstructed import ObstructedSolver, obstructed_solver, project_obstructed
 from core.room.pressure import PressureSolver, pressure_solver, project
 from core.room.room_grid import (
     AXES,
@@ -46,7 +47,7 @@ class RoomModel(eqx.Module):
     grid: RoomGrid
     boundary: Boundary
     closure: AbstractClosure
-    pressure: PressureSolver
+    pressure: PressureSolver | ObstructedSolver
     buoyancy_m_s2_k: Float[Array, ""]
     molecular_m2_s: Float[Array, ""]
     prandtl: Float[Array, ""]
@@ -57,7 +58,11 @@ class RoomModel(eqx.Module):
         """The closure's viscosity, its eddy part times exp(log_viscosity) in the cells."""
         raw = self.closure.viscosity(flow.turbulence, flow.velocity, self.grid)
         eddy = (raw.cells_m2_s - self.molecular_m2_s) * jnp.exp(self.log_viscosity)
-        return Viscosity(eddy + self.molecular_m2_s, raw.walls_m2_s)
+        cells, solids = eddy + self.molecular_m2_s, self.boundary.solids
+        if solids is None:
+            return Viscosity(cells, raw.walls_m2_s)
+        on_objects = self.closure.object_viscosity_m2_s(flow.turbulence, cells, solids)
+        return Viscosity(cells, raw.walls_m2_s, on_objects)
 
     def diffusivity_m2_s(self, viscosity: Viscosity) -> Cells:
         """nu / Pr + nu_t / Pr_t."""
@@ -79,7 +84,7 @@ def room_model(
         grid,
         boundary,
         closure,
-        pressure_solver(grid),
+        pressure_solver(grid) if boundary.solids is None else obstructed_solver(grid, boundary.solids),
         jnp.float32(buoyancy_m_s2_k),
         jnp.float32(molecular_m2_s),
         jnp.float32(prandtl),
@@ -100,14 +105,20 @@ def step(flow: Flow, viscosity: Viscosity, model: RoomModel, dt_s: Float[Array, 
     """The flow after `dt_s`, turbulence unchanged."""
     grid, boundary = model.grid, model.boundary
     factors = model.closure.wall_heat(flow.turbulence, grid)
+    solids = boundary.solids
+    of_objects = None if solids is None else model.closure.object_heat(flow.turbulence, solids)
     inflow = tuple((low.inflow_excess_k, high.inflow_excess_k) for low, high in boundary.walls)
     heating = scalar_rate(
         flow.excess_k, inflow, flow.velocity, model.diffusivity_m2_s(viscosity), boundary, grid
-    ) + wall_heat_rate(flow.excess_k, boundary, factors, grid)
+    ) + wall_heat_rate(flow.excess_k, boundary, factors, grid, of_objects)
     excess_k = flow.excess_k + dt_s * heating
     rates = momentum_rate(flow.velocity, viscosity, model.buoyancy_m_s2_k * excess_k, boundary, grid)
     u, v, w = (_advance_inner(flow.velocity[a], dt_s * rates[a], a) for a in AXES)
-    velocity, pressure = project((u, v, w), dt_s, grid, model.pressure)
+    solver = model.pressure
+    if isinstance(solver, PressureSolver):
+        velocity, pressure = project((u, v, w), dt_s, grid, solver)
+    else:
+        velocity, pressure = project_obstructed((u, v, w), dt_s, grid, solver)
     return Flow(velocity, excess_k, pressure, flow.turbulence)
 
 

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from core.room.room_grid import AXES, RoomGrid, Velocity, first_plane, last_plane, stored
+from core.room.solids import Solids
 
 Plane = Float[Array, "first second"]
 
@@ -36,9 +37,10 @@ class WallPlane(eqx.Module):
 
 
 class Boundary(eqx.Module):
-    """Walls as (low, high) an axis."""
+    """Walls as (low, high) an axis, and the objects in the room; None where there are none."""
 
     walls: tuple[tuple[WallPlane, WallPlane], tuple[WallPlane, WallPlane], tuple[WallPlane, WallPlane]]
+    solids: Solids | None = None
 
 
 def closed_wall(grid: RoomGrid, axis: int, no_slip: float = 1.0) -> WallPlane:

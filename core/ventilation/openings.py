@@ -15,7 +15,6 @@ from core.geometry import WALLS, Face, face_of
 from core.scene import Inlet, Outlet, Patch, Scene
 from core.ventilation.face_flow import FaceFlow, Vertices, around, corner_mean
 
-HEAT_CAPACITY_J_KG_K = 1006.0
 # A face of an opening's edge lets less than this share of the greatest flow through.
 _UNSMEARED = 0.8
 
@@ -58,7 +57,7 @@ def exchange(flow: FaceFlow, temperature_k: Vertices, scene: Scene) -> AirExchan
 
 def heat_capacity_j_m3_k(air: Air) -> float:
     """Of a cubic metre of the air at rest."""
-    return air.density_kg_m3 * HEAT_CAPACITY_J_KG_K
+    return air.heat_capacity_j_m3_k
 
 
 def _stated(flow: FaceFlow, temperature_k: Vertices, scene: Scene) -> Iterator[Passage]:

@@ -50,7 +50,7 @@ class Volume:
 
 
 def volumes_of(solution: Solution) -> dict[str, Volume]:
-    """Return every scalar of a solution by the name that it has in result.nc."""
+    """Return every scalar of a solution by the name that it has in result.nc; no wind in objects."""
     found = {
         "T": ("K", "temperature", solution.temperature_k),
         "p": ("m2 s-2", "kinematic pressure", solution.pressure_m2_s2),
@@ -60,7 +60,7 @@ def volumes_of(solution: Solution) -> dict[str, Volume]:
     }
     for index, axis in enumerate("xyz"):
         for stem, words, vectors in (
-            ("", "velocity", solution.velocity_m_s),
+            ("", "velocity", solution.filled().velocity_m_s),
             ("_std", "standard deviation of velocity", solution.velocity_std_m_s),
         ):
             values = None if vectors is None else vectors[..., index]

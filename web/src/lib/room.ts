@@ -1,9 +1,9 @@
-// What stands in a room, read from its scene: openings and heaters as rectangles.
+// What stands in a room, read from its scene: openings, heaters and the faces of objects as rectangles.
 
 export type Vector = [number, number, number];
 
 export interface Opening {
-  kind: "inlet" | "outlet" | "heater";
+  kind: "inlet" | "outlet" | "heater" | "object";
   corners: Vector[];
   label: string;
 }
@@ -15,21 +15,38 @@ interface Part {
 interface Scene {
   room: { lower_m: number[]; upper_m: number[] };
   boundary?: Part[];
+  objects?: Thing[];
+}
+interface Thing {
+  name: string;
+  lower_m: number[];
+  upper_m: number[];
 }
 
 const NAMES = { inlet: "supply", outlet: "outlet", heater: "heater" } as const;
 const isNamed = (kind: string): kind is keyof typeof NAMES => kind in NAMES;
 
-/** The openings that the settings of an experiment name; none where there is no scene. */
+/** The openings and objects that the settings of an experiment name; none where there is no scene. */
 export function openingsOf(settings: unknown): Opening[] {
   const scene = (settings as { scene?: Scene } | undefined)?.scene;
   if (!scene) return [];
   const parts = (scene.boundary ?? []).filter((one) => one.patch && isNamed(one.kind));
-  return parts.map((one) => {
+  const openings = parts.map((one): Opening => {
     const kind = one.kind as Opening["kind"];
     const alike = parts.filter((other) => other.kind === kind);
     const number = alike.length > 1 ? ` ${alike.indexOf(one) + 1}` : "";
     return { kind, label: `${NAMES[kind]}${number}`, corners: cornersOf(one.patch!, scene.room) };
+  });
+  return [...openings, ...(scene.objects ?? []).flatMap(facesOf)];
+}
+
+/** The six faces of a box; its name is on the top. */
+function facesOf(thing: Thing): Opening[] {
+  return ["z_max", "z_min", "x_min", "x_max", "y_min", "y_max"].map((wall): Opening => {
+    const across = "xyz".indexOf(wall[0]!);
+    const without = (corner: number[]) => corner.filter((_, axis) => axis !== across);
+    const patch = { wall, lower_m: without(thing.lower_m), upper_m: without(thing.upper_m) };
+    return { kind: "object", label: wall === "z_max" ? thing.name : "", corners: cornersOf(patch, thing) };
   });
 }
 

@@ -55,7 +55,12 @@ const SMOOTH_MS = 90;
 const FASTER = 4;
 const TAIL_S = 1.5;
 const FRAME_MS = 40;
-const OPENINGS = { inlet: [0.45, 0.85, 1], outlet: [1, 0.75, 0.4], heater: [1, 0.45, 0.4] } as const;
+const OPENINGS = {
+  inlet: [0.45, 0.85, 1],
+  outlet: [1, 0.75, 0.4],
+  heater: [1, 0.45, 0.4],
+  object: [0.6, 0.6, 0.62],
+} as const;
 
 export function createScene(place: HTMLElement): Scene3d {
   const view = vtkGenericRenderWindow.newInstance({ background: [0.08, 0.09, 0.11], listenWindowResize: false });
@@ -121,7 +126,10 @@ export function createScene(place: HTMLElement): Scene3d {
     // An actor that has nothing to draw yet cannot be rendered.
     for (const actor of [planeActor!, surface, arrowActor!, lineActor!, strokeActor!, frame, ...walls])
       if (actor.getMapper()) renderer.addActor(actor);
-    marks.set([...axisMarks(axes), ...openings.map((one) => ({ text: one.label, at: middleOf(one.corners) }))]);
+    marks.set([
+      ...axisMarks(axes),
+      ...openings.filter((one) => one.label).map((one) => ({ text: one.label, at: middleOf(one.corners) })),
+    ]);
     const isFirst = shown === null;
     shown = { values, axes };
     if (isFirst) look("Corner");
