@@ -43,3 +43,14 @@ class Solution(eqx.Module):
     solver_s: float = 0.0
     history: tuple[Mapping[str, float | str], ...] = eqx.field(static=True, default=())
     notes: tuple[str, ...] = eqx.field(static=True, default=())
+
+
+class Derived(eqx.Module):
+    """A quantity that follows from a solution, on its vertices; the ends of its 95 % interval where it has one."""
+
+    name: str = eqx.field(static=True)
+    unit: str = eqx.field(static=True)
+    label: str = eqx.field(static=True)
+    values: Float[np.ndarray, "nx ny nz"]
+    low: Float[np.ndarray, "nx ny nz"] | None = None
+    high: Float[np.ndarray, "nx ny nz"] | None = None

@@ -5,7 +5,7 @@ particles (VTK).
 """
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -15,13 +15,13 @@ from pyevtk.hl import imageToVTK
 
 from app.errors import BadInputError
 from app.experiment.folder import open_experiment
-from app.experiment.results import read_result, to_dataset
+from app.experiment.results import read_derived, read_result, to_dataset
 from app.files.durable import write_durably
 from app.report.figures import as_png, slices_figure
 from app.report.openfoam import write_openfoam
 from app.report.paths import write_vtu
 from app.report.surface import write_ply
-from core.result import Solution
+from core.result import Derived, Solution
 
 ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu"]
 
@@ -47,8 +47,8 @@ def export(
         write_durably(path, lambda temporary: shutil.copyfile(source, temporary))
     else:
         writers: dict[str, Callable[[Path, Solution], object]] = {
-            "vti": _write_vti,
-            "csv": _write_csv,
+            "vti": partial(_write_vti, derived=read_derived(source)),
+            "csv": partial(_write_csv, derived=read_derived(source)),
             "zip": write_openfoam,
             "png": _write_png,
             "vtu": write_vtu,
@@ -60,9 +60,9 @@ def export(
     return path
 
 
-def _write_vti(path: Path, solution: Solution) -> None:
-    """VTK image data (XML): evenly spaced vertices, T, p and vectors as point data."""
-    dataset = to_dataset(solution, {})
+def _write_vti(path: Path, solution: Solution, derived: Sequence[Derived] = ()) -> None:
+    """VTK image data (XML): evenly spaced vertices, T, p, vectors and what follows from them as point data."""
+    dataset = to_dataset(solution, {}, derived)
     points: dict[str, Any] = {
         str(name): np.asfortranarray(dataset[name].to_numpy())
         for name in dataset.data_vars
@@ -80,9 +80,9 @@ def _write_vti(path: Path, solution: Solution) -> None:
     )
 
 
-def _write_csv(path: Path, solution: Solution) -> None:
+def _write_csv(path: Path, solution: Solution, derived: Sequence[Derived] = ()) -> None:
     """One row a vertex; the header names quantity and unit."""
-    dataset = to_dataset(solution, {})
+    dataset = to_dataset(solution, {}, derived)
     table = dataset.to_dataframe().reset_index()
     table.columns = [f"{name} [{dataset[name].attrs['units']}]" for name in table.columns]
     table.to_csv(path, index=False, float_format="%.9g")

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from app.api.models.strict import Strict
 
-Kind = Literal["found", "uncertainty", "truth", "error"]
+Kind = Literal["found", "derived", "uncertainty", "truth", "error"]
 Form = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu"]
 
 
