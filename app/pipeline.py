@@ -22,7 +22,6 @@ from app.reconstruct.presets import AUTO, check_data_term, resolved, solved
 from app.reconstruct.presets import preset as preset_called
 from app.reconstruct.problem import known_of, problem_of
 from app.report.finding import Finding
-from app.report.maps import derived_maps
 from app.report.page import write_report
 from core.problem import Problem
 from core.result import Solution
@@ -144,7 +143,7 @@ def _keep(folder: Path, finding: Finding, measurement: Measurement) -> None:
             "preset": manifest["preset"],
             "assumed": "\n".join(manifest["assumed"]),
         },
-        derived_maps(solution, finding.experiment.settings.scene),
+        finding.derived,
     )
     write_shifts(folder, measurement.shifts)
     lines = (json.dumps({name: _told(value) for name, value in row.items()}) for row in solution.history)

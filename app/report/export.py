@@ -1,7 +1,7 @@
 """`export`: a result for another program.
 
-NetCDF (or HDF5), VTK image data, CSV, an OpenFOAM case, a picture, the surface of one temperature (PLY), or paths of
-particles (VTK).
+NetCDF (or HDF5), VTK image data, CSV, an OpenFOAM case, a picture, the surface of one temperature (PLY), paths of
+particles (VTK), or the report on two pages (PDF).
 """
 
 import shutil
@@ -20,10 +20,11 @@ from app.files.durable import write_durably
 from app.report.figures import as_png, slices_figure
 from app.report.openfoam import write_openfoam
 from app.report.paths import write_vtu
+from app.report.pdf import report_pdf
 from app.report.surface import write_ply
 from core.result import Derived, Solution
 
-ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu"]
+ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf"]
 
 
 def export(
@@ -53,6 +54,7 @@ def export(
             "png": _write_png,
             "vtu": write_vtu,
         }
+        writers["pdf"] = lambda temporary, _: report_pdf(folder, source.parent, temporary)
         writers["ply"] = partial(write_ply, level_k=level_k)
         writer = writers[kind]
         solution = read_result(source)
@@ -90,5 +92,4 @@ def _write_csv(path: Path, solution: Solution, derived: Sequence[Derived] = ()) 
 
 def _write_png(path: Path, solution: Solution) -> None:
     """The middle planes of the temperature, with arrows where velocity is known."""
-    level_k = float(np.round(np.mean(solution.temperature_k), 1))
-    path.write_bytes(as_png(slices_figure(solution, level_k)))
+    path.write_bytes(as_png(slices_figure(solution)))

@@ -5,7 +5,7 @@ from typing import Any, Literal
 from app.api.models.strict import Strict
 
 Kind = Literal["found", "derived", "uncertainty", "truth", "error"]
-Form = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu"]
+Form = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf"]
 
 
 class PresetResource(Strict):
