@@ -80,13 +80,13 @@ def _first(finding: Finding, title: str) -> Iterable[Flowable]:
     yield Spacer(1, 2 * mm)
     for sentence in summary(finding):
         yield _text(sentence, _LEAD)
-    yield from _picture(lambda: room_figure(finding.solution, finding.experiment.settings.scene), 0.94)
+    yield from _picture(lambda: room_figure(finding.solution, finding.experiment.settings.scene), 0.8)
     yield from _table(
         ("place", "temperature, 95 %", "true", "speed, 95 %", "true"),
         lambda: rows(places(finding.solution, finding.experiment.settings.scene, finding.truth)),
         (0.38, 0.19, 0.12, 0.19, 0.12),
     )
-    yield from _picture(lambda: maps_figure(finding), 0.92)
+    yield from _picture(lambda: maps_figure(finding), 0.84)
     yield _text(
         "Maps seen from above, 1.1 m over the floor, the height of sitting people's heads. Truths are known of "
         "simulated rooms only.",
@@ -99,10 +99,10 @@ def _second(finding: Finding) -> Iterable[Flowable]:
     yield _text("People and ventilation", _HEAD)
     yield from _table(("quantity", "value", "95 %"), lambda: _figures(finding), (0.5, 0.2, 0.3))
     yield _text("How sure it is", _HEAD)
-    yield from _picture(lambda: slices_figure(solution), 0.82)
+    yield from _picture(lambda: slices_figure(solution), 0.66)
     if solution.temperature_std_k is not None:
         deviation = solution.temperature_std_k
-        yield from _picture(lambda: volume_figure(solution, deviation, "one sigma of T [K]"), 0.82)
+        yield from _picture(lambda: volume_figure(solution, deviation, "one sigma of T [K]"), 0.66)
     yield from _table(
         ("quantity", "error", "trivial answers"), lambda: score_rows(finding), (0.4, 0.15, 0.45)
     )

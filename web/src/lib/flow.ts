@@ -139,7 +139,8 @@ function lattice(grid: Grid, each: number): Vector[] {
   return found;
 }
 
-function at(grid: Grid, where: Vector): Vector {
+/** Velocity at a place, linear between vertices. */
+export function at(grid: Grid, where: Vector): Vector {
   const [nx = 1, ny = 1, nz = 1] = grid.u.shape;
   const shape = [nx, ny, nz];
   const [low, size] = [lows(grid), sizes(grid)];
