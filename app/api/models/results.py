@@ -30,7 +30,7 @@ class ResultLine(Strict):
 
 
 class FieldResource(Strict):
-    """One scalar on the result's vertices; `low` and `high` leave out a hundredth on each side."""
+    """One scalar on the result's vertices; `low` and `high` leave out the walls, and a hundredth on each side."""
 
     name: str
     unit: str

@@ -35,7 +35,7 @@ export function arrows(grid: Grid, each = 9): Lines {
   return linesOf(segments, speeds);
 }
 
-export function streamlines(grid: Grid, each = 5, steps = 300): Lines {
+export function streamlines(grid: Grid, each = 4, steps = 300): Lines {
   const lines: Vector[][] = [];
   const speeds: number[] = [];
   const fastest = speedLimit(grid);

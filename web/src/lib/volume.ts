@@ -66,7 +66,7 @@ const STRIDES = [1.5, 2.2, 3.2] as const;
 const SMOOTH_MS = 90;
 // Room air crosses a room in half a minute: shown so many times as fast, each stroke as long as it goes in this time.
 const FASTER = 4;
-const TAIL_S = 1.5;
+const TAIL_S = 3;
 const FRAME_MS = 40;
 const OPENINGS = { inlet: [0.45, 0.85, 1], outlet: [1, 0.75, 0.4], heater: [1, 0.45, 0.4] } as const;
 
@@ -92,6 +92,8 @@ export function createScene(place: HTMLElement): Scene3d {
   planeActor!.getProperty().setLighting(false);
   arrowActor!.getProperty().setLineWidth(2);
   lineActor!.getProperty().setLineWidth(1.5);
+  // What moves along them is to be seen first.
+  lineActor!.getProperty().setOpacity(0.4);
   strokeActor!.getProperty().setLineWidth(4);
   const outline = vtkOutlineFilter.newInstance();
   const frame = actorOf(outline.getOutputPort());
@@ -187,7 +189,9 @@ export function createScene(place: HTMLElement): Scene3d {
     camera.setPosition(x + dx, y + dy, z + dz);
     camera.setViewUp(0, 0, 1);
     renderer.resetCamera();
-    camera.zoom(from === "Corner" ? 1 : 1.1);
+    // On a narrow screen the room's width is the limit.
+    const isNarrow = place.clientWidth < 1.2 * place.clientHeight;
+    camera.zoom(isNarrow ? 0.85 : from === "Corner" ? 1.1 : 1.3);
     renderer.resetCameraClippingRange();
     window3d.render();
     marks.put();
@@ -379,6 +383,8 @@ function sightOf(camera: Vector, axes: Grid["axes"]): Actor {
   actor.setMapper(mapper);
   actor.getProperty().setColor(0.45, 0.5, 0.56);
   actor.getProperty().setOpacity(0.5);
+  // What stands before the room makes nobody step back from it.
+  actor.setUseBounds(false);
   return actor;
 }
 
