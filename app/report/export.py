@@ -20,7 +20,6 @@ from app.files.durable import write_durably
 from app.report.figures import as_png, slices_figure
 from app.report.openfoam import write_openfoam
 from app.report.paths import write_vtu
-from app.report.pdf import report_pdf
 from app.report.surface import write_ply
 from core.result import Derived, Solution
 
@@ -54,7 +53,7 @@ def export(
             "png": _write_png,
             "vtu": write_vtu,
         }
-        writers["pdf"] = lambda temporary, _: report_pdf(folder, source.parent, temporary)
+        writers["pdf"] = lambda temporary, _: _write_pdf(temporary, folder, source.parent)
         writers["ply"] = partial(write_ply, level_k=level_k)
         writer = writers[kind]
         solution = read_result(source)
@@ -88,6 +87,14 @@ def _write_csv(path: Path, solution: Solution, derived: Sequence[Derived] = ()) 
     table = dataset.to_dataframe().reset_index()
     table.columns = [f"{name} [{dataset[name].attrs['units']}]" for name in table.columns]
     table.to_csv(path, index=False, float_format="%.9g")
+
+
+def _write_pdf(path: Path, folder: Path, result: Path) -> None:
+    """The report on two pages."""
+    # Imported here: the other formats need none of the array library behind it.
+    from app.report.pdf import report_pdf
+
+    report_pdf(folder, result, path)
 
 
 def _write_png(path: Path, solution: Solution) -> None:

@@ -22,6 +22,7 @@ from reportlab.platypus import (
 )
 
 from app.errors import explained
+from app.experiment.folder import open_experiment
 from app.report.answer import advice, summary
 from app.report.beside import places, rows
 from app.report.figures import as_png, slices_figure, volume_figure
@@ -57,8 +58,6 @@ _METHOD = (
 
 def report_pdf(folder: Path, result: Path, path: Path) -> None:
     """Write the report of a kept result. Raises BadInputError for a result that cannot be read."""
-    from app.experiment.folder import open_experiment
-
     write_pdf(read_finding(open_experiment(folder), result), path)
 
 
