@@ -143,6 +143,7 @@ def _keep(folder: Path, finding: Finding, measurement: Measurement) -> None:
             "preset": manifest["preset"],
             "assumed": "\n".join(manifest["assumed"]),
         },
+        finding.derived,
     )
     write_shifts(folder, measurement.shifts)
     lines = (json.dumps({name: _told(value) for name, value in row.items()}) for row in solution.history)

@@ -87,3 +87,14 @@ _FIELDS = (
     "temperature_k", "pressure_m2_s2", "velocity_m_s", "temperature_std_k", "pressure_std_m2_s2",
     "velocity_std_m_s", "informed",
 )  # fmt: skip
+
+
+class Derived(eqx.Module):
+    """A quantity that follows from a solution, on its vertices; the ends of its 95 % interval where it has one."""
+
+    name: str = eqx.field(static=True)
+    unit: str = eqx.field(static=True)
+    label: str = eqx.field(static=True)
+    values: Float[np.ndarray, "nx ny nz"]
+    low: Float[np.ndarray, "nx ny nz"] | None = None
+    high: Float[np.ndarray, "nx ny nz"] | None = None

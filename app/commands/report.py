@@ -17,20 +17,22 @@ def register(cli: typer.Typer) -> None:
 def report(
     experiment: Annotated[Path, typer.Argument(help="Experiment folder.")],
     result: Result = None,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Two pages of A4 to hand on, instead of HTML.")] = False,
 ) -> None:
-    """Write the report of a result: one HTML file that needs no network."""
+    """Write the report of a result: one HTML file that needs no network, or two pages of PDF."""
+    from app.report.export import export as exported
     from app.report.page import report_again
 
-    typer.echo(str(report_again(experiment, result)))
+    typer.echo(str(exported(experiment, "pdf", None, result) if pdf else report_again(experiment, result)))
 
 
 def export(
     experiment: Annotated[Path, typer.Argument(help="Experiment folder.")],
     kind: Annotated[
-        Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu"],
+        Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf"],
         typer.Option(
             "--format",
-            help="File format; zip is an OpenFOAM case, ply the surface of one temperature, vtu paths of particles.",
+            help="zip is an OpenFOAM case, ply a surface of one temperature, vtu paths of particles, pdf the report.",
         ),
     ] = "nc",
     output: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,

@@ -1,5 +1,6 @@
 """Results on disk: result.nc (NetCDF, CF names and units) and its way back into a `Solution`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +9,11 @@ import xarray as xr
 
 from app.files.durable import durable_path
 from app.files.reading import reading
-from core.result import Outcome, Solution
+from core.result import Derived, Outcome, Solution
 
 _DIMS = ("x", "y", "z")
+# The mark of a variable that follows from T and u.
+_DERIVED = "derived from T and u and their deviations"
 
 # Solution field -> (variable, units, CF standard name or '', long name)
 _VOLUMES = {
@@ -26,8 +29,11 @@ _VECTORS = {
 }
 
 
-def to_dataset(solution: Solution, attributes: dict[str, str]) -> xr.Dataset:
-    """The solution as a CF dataset: coordinates x, y, z [m]; T [K], p [m2 s-2], u, v, w [m s-1]."""
+def to_dataset(solution: Solution, attributes: dict[str, str], derived: Sequence[Derived] = ()) -> xr.Dataset:
+    """The solution as a CF dataset: coordinates x, y, z [m]; T [K], p [m2 s-2], u, v, w [m s-1].
+
+    Each of `derived` is there by its name, the ends of its interval as NAME_low and NAME_high.
+    """
     coordinates = {
         axis: (
             axis,
@@ -48,6 +54,10 @@ def to_dataset(solution: Solution, attributes: dict[str, str]) -> xr.Dataset:
             for i, axis in enumerate(_DIMS):
                 names = {"units": "m s-1", "long_name": f"{long} along {axis}"}
                 variables[_component(stem, i)] = (_DIMS, np.asarray(values[..., i], np.float32), names)
+    for one in derived:
+        for ending, long, values in _ends(one):
+            names = {"units": one.unit, "long_name": long, "source": _DERIVED}
+            variables[one.name + ending] = (_DIMS, np.asarray(values, np.float32), names)
     notes = {
         "Conventions": "CF-1.11",
         "outcome": solution.outcome.name,
@@ -57,9 +67,21 @@ def to_dataset(solution: Solution, attributes: dict[str, str]) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, notes | attributes)
 
 
-def write_result(path: Path, solution: Solution, attributes: dict[str, str]) -> None:
+def _ends(one: Derived) -> list[tuple[str, str, np.ndarray]]:
+    """What is kept of a derived quantity: the end of its name, its label, and its values."""
+    parts = (
+        ("", one.label, one.values),
+        ("_low", f"{one.label}, lower end of its 95 % interval", one.low),
+        ("_high", f"{one.label}, upper end of its 95 % interval", one.high),
+    )
+    return [(ending, label, values) for ending, label, values in parts if values is not None]
+
+
+def write_result(
+    path: Path, solution: Solution, attributes: dict[str, str], derived: Sequence[Derived] = ()
+) -> None:
     """Write result.nc durably."""
-    dataset = to_dataset(solution, attributes)
+    dataset = to_dataset(solution, attributes, derived)
     encoding = {name: {"zlib": True, "complevel": 4} for name in dataset.data_vars}
     with durable_path(path) as temporary:
         dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
@@ -88,6 +110,30 @@ def read_result(path: Path) -> Solution:
             notes=tuple(str(data.attrs["notes"]).splitlines()),
             **fields,
         )
+
+
+def read_derived(path: Path) -> tuple[Derived, ...]:
+    """What follows from the solution in result.nc, as it was kept beside it. Raises BadInputError."""
+    with reading(path, "Reconstruct again, or give a result.nc."):
+        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+            kept = [str(name) for name, one in dataset.items() if one.attrs.get("source") == _DERIVED]
+            data = dataset[kept].load()
+
+    def values(name: str) -> np.ndarray | None:
+        return data[name].to_numpy() if name in data else None
+
+    return tuple(
+        Derived(
+            name,
+            data[name].attrs["units"],
+            data[name].attrs["long_name"],
+            data[name].to_numpy(),
+            values(f"{name}_low"),
+            values(f"{name}_high"),
+        )
+        for name in kept
+        if not name.endswith(("_low", "_high"))
+    )
 
 
 def _check(name: str, values: np.ndarray | None, shape: tuple[int, ...]) -> None:

@@ -1,11 +1,11 @@
 """`export`: a result for another program.
 
-NetCDF (or HDF5), VTK image data, CSV, an OpenFOAM case, a picture, the surface of one temperature (PLY), or paths of
-particles (VTK).
+NetCDF (or HDF5), VTK image data, CSV, an OpenFOAM case, a picture, the surface of one temperature (PLY), paths of
+particles (VTK), or the report on two pages (PDF).
 """
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -15,15 +15,15 @@ from pyevtk.hl import imageToVTK
 
 from app.errors import BadInputError
 from app.experiment.folder import open_experiment
-from app.experiment.results import read_result, to_dataset
+from app.experiment.results import read_derived, read_result, to_dataset
 from app.files.durable import write_durably
 from app.report.figures import as_png, slices_figure
 from app.report.openfoam import write_openfoam
 from app.report.paths import write_vtu
 from app.report.surface import write_ply
-from core.result import Solution
+from core.result import Derived, Solution
 
-ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu"]
+ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf"]
 
 
 def export(
@@ -47,12 +47,13 @@ def export(
         write_durably(path, lambda temporary: shutil.copyfile(source, temporary))
     else:
         writers: dict[str, Callable[[Path, Solution], object]] = {
-            "vti": _write_vti,
-            "csv": _write_csv,
+            "vti": partial(_write_vti, derived=read_derived(source)),
+            "csv": partial(_write_csv, derived=read_derived(source)),
             "zip": write_openfoam,
             "png": _write_png,
             "vtu": write_vtu,
         }
+        writers["pdf"] = lambda temporary, _: _write_pdf(temporary, folder, source.parent)
         writers["ply"] = partial(write_ply, level_k=level_k)
         writer = writers[kind]
         solution = read_result(source)
@@ -60,9 +61,9 @@ def export(
     return path
 
 
-def _write_vti(path: Path, solution: Solution) -> None:
-    """VTK image data (XML): evenly spaced vertices, T, p and vectors as point data."""
-    dataset = to_dataset(solution, {})
+def _write_vti(path: Path, solution: Solution, derived: Sequence[Derived] = ()) -> None:
+    """VTK image data (XML): evenly spaced vertices, T, p, vectors and what follows from them as point data."""
+    dataset = to_dataset(solution, {}, derived)
     points: dict[str, Any] = {
         str(name): np.asfortranarray(dataset[name].to_numpy())
         for name in dataset.data_vars
@@ -80,15 +81,22 @@ def _write_vti(path: Path, solution: Solution) -> None:
     )
 
 
-def _write_csv(path: Path, solution: Solution) -> None:
+def _write_csv(path: Path, solution: Solution, derived: Sequence[Derived] = ()) -> None:
     """One row a vertex; the header names quantity and unit."""
-    dataset = to_dataset(solution, {})
+    dataset = to_dataset(solution, {}, derived)
     table = dataset.to_dataframe().reset_index()
     table.columns = [f"{name} [{dataset[name].attrs['units']}]" for name in table.columns]
     table.to_csv(path, index=False, float_format="%.9g")
 
 
+def _write_pdf(path: Path, folder: Path, result: Path) -> None:
+    """The report on two pages."""
+    # Imported here: the other formats need none of the array library behind it.
+    from app.report.pdf import report_pdf
+
+    report_pdf(folder, result, path)
+
+
 def _write_png(path: Path, solution: Solution) -> None:
     """The middle planes of the temperature, with arrows where velocity is known."""
-    level_k = float(np.round(np.nanmean(solution.temperature_k), 1))
-    path.write_bytes(as_png(slices_figure(solution, level_k)))
+    path.write_bytes(as_png(slices_figure(solution)))

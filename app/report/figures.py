@@ -8,12 +8,16 @@ from typing import Literal
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
+from core.comfort import CELSIUS_K
 from core.problem import ShiftMeasurement
 from core.result import Solution
 
 # Perceptually even and safe for colour-blind eyes.
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"
+# Cold and warm as people think of them.
+AIR = "RdYlBu_r"
 
 
 @dataclass(frozen=True)
@@ -86,17 +90,19 @@ def shift_figure(shift: ShiftMeasurement) -> Figure:
     return figure
 
 
-def slices_figure(solution: Solution, ambient_k: float) -> Figure:
-    """Temperature excess on three middle planes, with arrows of velocity where it is known."""
+def slices_figure(solution: Solution) -> Figure:
+    """Temperature on three middle planes with lines of equal values, and arrows of velocity where it is known."""
     figure = Figure(figsize=(13, 4.2), layout="constrained")
     axes = figure.subplots(1, 3)
-    excess = solution.temperature_k - ambient_k
-    low, high = np.nanpercentile(excess, [0.5, 99.5])
+    # As a file keeps it: lines of equal values would follow the last digits.
+    celsius = np.asarray(solution.temperature_k, np.float32) - np.float32(CELSIUS_K)
+    low, high = np.nanpercentile(celsius[1:-1, 1:-1, 1:-1], [0.5, 99.5])
+    levels = np.unique(MaxNLocator(8).tick_values(float(low), float(high)))
     drawn = [
-        _slice(axis, solution, excess, normal, SEQUENTIAL, float(low), float(high))
+        _slice(axis, solution, celsius, normal, AIR, float(low), float(high), levels=levels)
         for axis, normal in zip(axes, (1, 0, 2), strict=True)
     ]
-    figure.colorbar(drawn[0], ax=axes, label="T - T0 [K]", shrink=0.85)
+    figure.colorbar(drawn[0], ax=axes, label="temperature [°C]", shrink=0.85, extend="both")
     return figure
 
 
@@ -152,6 +158,7 @@ def _slice(
     low: float,
     high: float,
     arrows: bool = True,
+    levels: Sequence[float] | np.ndarray = (),
 ):
     coordinates = (solution.x_m, solution.y_m, solution.z_m)
     across, up = [i for i in range(3) if i != normal]
@@ -165,6 +172,12 @@ def _slice(
         vmax=high,
         shading="gouraud",
     )
+    if len(levels):
+        lines = axis.contour(
+            coordinates[across], coordinates[up], np.take(values, middle, axis=normal).T, levels=levels,
+            colors="#333333", linewidths=0.5, alpha=0.7,
+        )  # fmt: skip
+        axis.clabel(lines, fontsize=7, fmt="%g")
     if arrows and solution.velocity_m_s is not None:
         _arrows(axis, np.take(solution.velocity_m_s, middle, axis=normal), coordinates, across, up)
     axis.set_aspect("equal")
@@ -182,7 +195,7 @@ def _arrows(axis, velocity: np.ndarray, coordinates, across: int, up: int) -> No
         coordinates[up][::step_u],
         part[..., across].T,
         part[..., up].T,
-        color="white",
+        color="#102030",
         width=0.003,
         alpha=0.9,
     )

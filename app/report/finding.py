@@ -13,11 +13,13 @@ from app.experiment.captures import CapturePair, load_capture
 from app.experiment.folder import Experiment, read_manifest
 from app.experiment.results import read_result
 from app.experiment.shift_files import read_shifts
+from app.report.indoor import Indoor, indoor
+from app.report.maps import derived_maps
 from app.volume.comparison import truth_file
 from app.volume.file import RoomVolume, read_volume
 from app.volume.score import score_solution
 from core.problem import ShiftMeasurement
-from core.result import Solution
+from core.result import Derived, Solution
 
 Image = Float32[np.ndarray, "rows cols"]
 
@@ -43,6 +45,16 @@ class Finding:
     def scores(self) -> dict[str, Any] | None:
         """The project's yardstick, where there is a truth. Raises BadInputError."""
         return None if self.truth is None else score_solution(self.solution, self.truth)
+
+    @cached_property
+    def derived(self) -> tuple[Derived, ...]:
+        """Maps of what follows from T and u."""
+        return derived_maps(self.solution, self.experiment.settings.scene)
+
+    @cached_property
+    def indoor(self) -> Indoor:
+        """What the air means for people and ventilation. Raises SettingError for a room without an occupied zone."""
+        return indoor(self.solution, self.experiment.settings.scene)
 
 
 def read_finding(experiment: Experiment, folder: Path) -> Finding:

@@ -2,8 +2,10 @@
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Literal
 
 from app.capture.burst import BurstWatch, take
 from app.errors import AirlensError, BadInputError
@@ -32,10 +34,12 @@ def simulate(
     on_stage: OnStage = lambda stage, done, total: None,
     *,
     misreads: bool = False,
+    cells: int | Literal["auto"] = "auto",
 ) -> Path:
     """Make an experiment folder from a volume: scene, calibration, reference and flow captures.
 
     With `misreads` what is known of the boundary is as wrong as its deviations say, by the camera's seed.
+    `cells` is the solver's grid, as the scene states it.
     The whole folder appears at once, when it is complete. The truth is copied into it for the simulated
     rig and `score`; no reconstruction reads it. Raises BadInputError, SettingError.
     """
@@ -44,6 +48,7 @@ def simulate(
     volume = read_volume(truth_path)
     scene = room_scene(volume, options, information)
     scene = misread(scene, camera.seed) if misreads else scene
+    scene = replace(scene, solve=replace(scene.solve, grid=cells))
     with durable_folder(folder) as unfinished:
         _fill(unfinished, truth_path, volume, scene, information, camera, on_stage)
     return folder

@@ -98,11 +98,12 @@ def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: 
     page.get_by_role("checkbox", name="°C").uncheck()
     slices.nth(1).hover()
     expect(page.locator(".slice .probe").nth(1)).to_contain_text(re.compile(r"\d K, ±"))
-    page.get_by_label("Leave out extremes").check()
     expect(page.locator(".bar").first).to_contain_text("they have the end's colour")
+    page.get_by_label("Leave out extremes").uncheck()
+    expect(page.locator(".bar").first).not_to_contain_text("they have the end's colour")
     page.get_by_role("button", name="Its uncertainty").click()
-    expect(page.locator(".bar").first).to_contain_text("standard deviation of T")
-    page.get_by_role("button", name="Back to T").click()
+    expect(page.locator(".bar").first).to_contain_text("Temperature: standard deviation")
+    page.get_by_role("button", name="Back to temperature").click()
 
     choose(page, "20260101T000000-standard", "Compare with")
     expect(page.locator("main")).to_contain_text("solve: rounds")
@@ -158,3 +159,38 @@ def test_streamlines_move_where_motion_is_wanted(station: Station, opens: Opens)
     page.get_by_label("Moving").check()
     expect(place).to_have_attribute("data-moved", re.compile(r"\d\d"))
     page.get_by_label("Moving").uncheck()
+
+
+def test_pointing_a_link_and_a_film(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=64).experiment
+    keep(station.app.state.services.folders.open(name), "20260101T000000-standard", room(), "standard", 1.0)
+    watched = opens(station.address)
+    page = watched.page
+    # What there is to see is seen first.
+    expect(page.locator("main")).to_have_attribute("aria-label", "Look")
+    place = page.locator(".volume")
+    expect(place.locator("[data-frame-ms]")).to_be_attached()
+    box = place.bounding_box()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    expect(place.locator(".over")).to_contain_text(re.compile(r"°C, ± 0\.196 \(95 %\); speed \d"))
+    expect(place).to_contain_text("camera, 31 m from the wall")
+    usual = place.screenshot()
+    page.get_by_label("Streamlines").uncheck()
+    page.get_by_role("button", name="Side", exact=True).click()
+    choose(page, "speed")
+    turned = another(place, {usual})
+    page.get_by_role("button", name="Link to this view").click()
+    expect(page.locator("footer")).to_contain_text("link to this view", ignore_case=True)
+    link = page.url
+    page.goto("about:blank")
+    page.goto(link)
+    expect(page.locator(".bar").first).to_contain_text("Speed")
+    expect(page.get_by_label("Streamlines")).not_to_be_checked()
+    assert another(place, {usual}) != usual
+    assert turned
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Keep a film").click()
+    # WebM is Matroska: EBML's first bytes.
+    assert Path(download.value.path()).read_bytes().startswith(b"\x1a\x45\xdf\xa3")
+    assert watched.complaints == []

@@ -4,8 +4,8 @@ from typing import Any, Literal
 
 from app.api.models.strict import Strict
 
-Kind = Literal["found", "uncertainty", "truth", "error"]
-Form = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu"]
+Kind = Literal["found", "derived", "uncertainty", "truth", "error"]
+Form = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf"]
 
 
 class PresetResource(Strict):
@@ -30,7 +30,7 @@ class ResultLine(Strict):
 
 
 class FieldResource(Strict):
-    """One scalar on the result's vertices; `low` and `high` leave out a hundredth on each side."""
+    """One scalar on the result's vertices; `low` and `high` leave out the walls, and a hundredth on each side."""
 
     name: str
     unit: str

@@ -2,6 +2,7 @@
 
 import threading
 from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -12,7 +13,7 @@ from jaxtyping import Float32
 from app.api.models.results import Kind
 from app.api.wire.problems import ApiError
 from app.volume.file import Beside
-from core.result import Solution
+from core.result import Derived, Solution
 
 Encoding = Literal["u16", "f16", "f32"]
 Axis = Literal["x", "y", "z"]
@@ -65,7 +66,7 @@ def volumes_of(solution: Solution) -> dict[str, Volume]:
         ):
             values = None if vectors is None else vectors[..., index]
             found["uvw"[index] + stem] = ("m s-1", f"{words} along {axis}", values)
-    return {
+    made = {
         name: Volume(
             name,
             unit,
@@ -76,6 +77,26 @@ def volumes_of(solution: Solution) -> dict[str, Volume]:
         for name, (unit, label, values) in found.items()
         if values is not None
     }
+    if solution.velocity_m_s is not None:
+        speed = np.linalg.norm(solution.velocity_m_s, axis=-1)
+        made["speed"] = Volume("speed", "m s-1", "speed of the air", "derived", speed.astype(np.float32))
+    return made
+
+
+def volumes_derived(derived: Sequence[Derived]) -> dict[str, Volume]:
+    """Return what follows from a solution, and the ends of its intervals, by the names in result.nc."""
+    found = {}
+    for one in derived:
+        low, high = one.low, one.high
+        found[one.name] = Volume(one.name, one.unit, one.label, "derived", np.asarray(one.values, np.float32))
+        for end, values in (("low", low), ("high", high)):
+            if values is not None:
+                name, label = f"{one.name}_{end}", f"{one.label}: 95 % interval, {_END[end]} end"
+                found[name] = Volume(name, one.unit, label, "uncertainty", np.asarray(values, np.float32))
+    return found
+
+
+_END = {"low": "lower", "high": "upper"}
 
 
 @dataclass(frozen=True)
@@ -99,7 +120,7 @@ class SolutionCache:
         Raises ApiError when there is no solution, BadInputError when one of them is damaged.
         """
         # Imported here: xarray takes a second, and a service should answer before that.
-        from app.experiment.results import read_result
+        from app.experiment.results import read_derived, read_result
         from app.volume.comparison import beside_truth
 
         if not path.is_file():
@@ -109,7 +130,10 @@ class SolutionCache:
             if key not in self._kept:
                 solution = read_result(path)
                 known = [] if truth is None else beside_truth(solution, truth)
-                self._kept[key] = Shown(solution, volumes_of(solution) | volumes_beside(known))
+                self._kept[key] = Shown(
+                    solution,
+                    volumes_of(solution) | volumes_derived(read_derived(path)) | volumes_beside(known),
+                )
                 while len(self._kept) > KEPT:
                     self._kept.popitem(last=False)
             self._kept.move_to_end(key)

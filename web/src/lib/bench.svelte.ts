@@ -45,6 +45,8 @@ class Bench {
   jobs = $state.raw<JobResource[]>([]);
   results = $state.raw<ResultLine[]>([]);
   result = $state<string | null>(null);
+  /** How the room is looked at, as an address brought it. */
+  view = "";
   problem = $state.raw<Problem | null>(null);
   working = $state<string | null>(null);
   /** True once the first answers are there: from then on the address follows the page. */
@@ -81,8 +83,9 @@ class Bench {
   async start(): Promise<void> {
     await this.attempt("Opening", async () => {
       await openSession();
-      this.read(location.hash);
+      const named = this.read(location.hash);
       await this.refresh();
+      if (!named && this.result) this.page = "Look";
       this.listen();
       this.opened = true;
     });
@@ -178,13 +181,16 @@ class Bench {
     if (this.experiment && this.experiment !== before) await this.choose(this.experiment, this.result);
   }
 
-  private read(hash: string): void {
-    const [page, experiment, result] = hash.replace(/^#\/?/, "").split("/").map(decodeURIComponent);
+  /** Whether the address names a page. */
+  private read(hash: string): boolean {
+    const [page, experiment, result, view] = hash.replace(/^#\/?/, "").split("/").map(decodeURIComponent);
     const found = [...PAGES, ...ASIDE].find((one) => one.toLowerCase() === page);
-    if (!found) return;
+    if (!found) return false;
     this.page = found;
     if (experiment) this.experiment = experiment;
     if (result) this.result = result;
+    if (view) this.view = view;
+    return true;
   }
 
   async choose(experiment: string, result: string | null = null): Promise<void> {

@@ -30,6 +30,21 @@ const PUOR: readonly Stop[] = [
   [127, 59, 8],
 ];
 
+// Blue to red through pale yellow (ColorBrewer RdYlBu), for the air's temperature: cold and warm as people think.
+const WARM: readonly Stop[] = [
+  [49, 54, 149],
+  [69, 117, 180],
+  [116, 173, 209],
+  [171, 217, 233],
+  [224, 243, 248],
+  [255, 255, 191],
+  [254, 224, 144],
+  [253, 174, 97],
+  [244, 109, 67],
+  [215, 48, 39],
+  [165, 0, 38],
+];
+
 // Light throughout, for lines on a dark ground: blue, green, yellow, orange.
 const LIGHT: readonly Stop[] = [
   [102, 178, 255],
@@ -38,7 +53,7 @@ const LIGHT: readonly Stop[] = [
   [255, 190, 80],
   [255, 120, 70],
 ];
-const STOPS = { rising: CIVIDIS, signed: PUOR, light: LIGHT };
+const STOPS = { rising: CIVIDIS, signed: PUOR, warm: WARM, light: LIGHT };
 
 export interface Scale {
   low: number;
@@ -50,7 +65,8 @@ export interface Scale {
 export function scaleFor(name: string, low: number, high: number): Scale {
   const reach = Math.max(Math.abs(low), Math.abs(high)) || 1;
   if (/^[uvwp](_truth)?$|_error$|_difference$/.test(name)) return { low: -reach, high: reach, kind: "signed" };
-  return { low, high: high > low ? high : low + 1e-6, kind: "rising" };
+  const kind = /^T(_truth)?$/.test(name) ? "warm" : "rising";
+  return { low, high: high > low ? high : low + 1e-6, kind };
 }
 
 export function stops(kind: Scale["kind"]): readonly Stop[] {

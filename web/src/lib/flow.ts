@@ -35,7 +35,7 @@ export function arrows(grid: Grid, each = 9): Lines {
   return linesOf(segments, speeds);
 }
 
-export function streamlines(grid: Grid, each = 5, steps = 300): Lines {
+export function streamlines(grid: Grid, each = 4, steps = 300): Lines {
   const lines: Vector[][] = [];
   const speeds: number[] = [];
   const fastest = speedLimit(grid);
@@ -139,7 +139,8 @@ function lattice(grid: Grid, each: number): Vector[] {
   return found;
 }
 
-function at(grid: Grid, where: Vector): Vector {
+/** Velocity at a place, linear between vertices. */
+export function at(grid: Grid, where: Vector): Vector {
   const [nx = 1, ny = 1, nz = 1] = grid.u.shape;
   const shape = [nx, ny, nz];
   const [low, size] = [lows(grid), sizes(grid)];

@@ -50,6 +50,13 @@ function facesOf(thing: Thing): Opening[] {
   });
 }
 
+/** Where the camera of the first view stands; none where there is no scene. */
+export function cameraOf(settings: unknown): Vector | null {
+  const scene = (settings as { scene?: { views?: { camera?: { position_m?: number[] } }[] } } | undefined)?.scene;
+  const at = scene?.views?.[0]?.camera?.position_m;
+  return at?.length === 3 ? (at as Vector) : null;
+}
+
 /** The four corners of a rectangle on a wall; its bounds go along the wall's two axes in the order x, y, z. */
 function cornersOf(patch: NonNullable<Part["patch"]>, room: Scene["room"]): Vector[] {
   const across = "xyz".indexOf(patch.wall[0] ?? "x");

@@ -37,14 +37,27 @@ export const VIEWS = {
   Top: [0, -0.001, 1],
 } as const;
 
+/** What stands in the room and before it. */
+export interface Stands {
+  openings: Opening[];
+  camera: Vector | null;
+}
+
 export interface Scene3d {
   /** Takes what is shown; the fastest speed [m/s] is given back where velocity is known. */
-  load(values: Numbers, velocity: Numbers[] | null, axes: Grid["axes"], scale: Scale, openings: Opening[]): number;
+  load(values: Numbers, velocity: Numbers[] | null, axes: Grid["axes"], scale: Scale, stands: Stands): number;
   /** `level` and `at` are shares: of the scale for the isosurface, of the room's depth for the plane. */
   show(modes: Modes, level: number, at: number): void;
   look(from: keyof typeof VIEWS): void;
   move(on: boolean): void;
   picture(): Promise<string>;
+  /** A film of so many seconds as it is seen; null where the browser cannot make one. */
+  film(seconds: number): Promise<Blob | null>;
+  /** The place on the shown plane under a pixel of the view, in metres; null beside it. */
+  under(x_px: number, y_px: number): Vector | null;
+  /** Where one looks from: position, focus and what is up, in nine numbers. */
+  seen(): number[];
+  see(from: number[]): void;
   close(): void;
 }
 
@@ -53,7 +66,7 @@ const STRIDES = [1.5, 2.2, 3.2] as const;
 const SMOOTH_MS = 90;
 // Room air crosses a room in half a minute: shown so many times as fast, each stroke as long as it goes in this time.
 const FASTER = 4;
-const TAIL_S = 1.5;
+const TAIL_S = 3;
 const FRAME_MS = 40;
 const OPENINGS = {
   inlet: [0.45, 0.85, 1],
@@ -84,6 +97,8 @@ export function createScene(place: HTMLElement): Scene3d {
   planeActor!.getProperty().setLighting(false);
   arrowActor!.getProperty().setLineWidth(2);
   lineActor!.getProperty().setLineWidth(1.5);
+  // What moves along them is to be seen first.
+  lineActor!.getProperty().setOpacity(0.4);
   strokeActor!.getProperty().setLineWidth(4);
   const outline = vtkOutlineFilter.newInstance();
   const frame = actorOf(outline.getOutputPort());
@@ -100,13 +115,14 @@ export function createScene(place: HTMLElement): Scene3d {
   let stride = 0;
   let voxel_m = 1;
   let timer = 0;
+  let depth = 0.5;
 
   function load(
     values: Numbers,
     velocity: Numbers[] | null,
     axes: Grid["axes"],
     wanted: Scale,
-    openings: Opening[],
+    { openings, camera }: Stands,
   ): number {
     scale = wanted;
     const image = imageOf(values, axes);
@@ -120,7 +136,7 @@ export function createScene(place: HTMLElement): Scene3d {
     outline.setInputData(image);
     const fastest = velocity ? flow({ axes, u: velocity[0]!, v: velocity[1]!, w: velocity[2]! }) : 0;
     planeActor!.setMapper(planeMapper(values, axes, 0.5, scale));
-    walls = openings.map(openingOf);
+    walls = [...openings.map(openingOf), ...(camera ? [sightOf(camera, axes)] : [])];
     renderer.removeAllViewProps();
     renderer.addVolume(volume);
     // An actor that has nothing to draw yet cannot be rendered.
@@ -129,6 +145,7 @@ export function createScene(place: HTMLElement): Scene3d {
     marks.set([
       ...axisMarks(axes),
       ...openings.filter((one) => one.label).map((one) => ({ text: one.label, at: middleOf(one.corners) })),
+      ...(camera ? [cameraMark(camera, axes)] : []),
     ]);
     const isFirst = shown === null;
     shown = { values, axes };
@@ -156,6 +173,7 @@ export function createScene(place: HTMLElement): Scene3d {
     arrowActor!.setVisibility(modes.arrows && strokes !== null);
     lineActor!.setVisibility(modes.streamlines && strokes !== null);
     strokeActor!.setVisibility(modes.streamlines && strokes !== null);
+    depth = at;
     const value = scale.low + level * (scale.high - scale.low);
     if (modes.surface) cubes.setContourValue(value);
     const colour: number[] = [0, 0, 0];
@@ -176,7 +194,9 @@ export function createScene(place: HTMLElement): Scene3d {
     camera.setPosition(x + dx, y + dy, z + dz);
     camera.setViewUp(0, 0, 1);
     renderer.resetCamera();
-    camera.zoom(from === "Corner" ? 1 : 1.1);
+    // On a narrow screen the room's width is the limit.
+    const isNarrow = place.clientWidth < 1.2 * place.clientHeight;
+    camera.zoom(isNarrow ? 0.85 : from === "Corner" ? 1.1 : 1.3);
     renderer.resetCameraClippingRange();
     window3d.render();
     marks.put();
@@ -224,6 +244,52 @@ export function createScene(place: HTMLElement): Scene3d {
     return (await captured) ?? "";
   }
 
+  function film(seconds: number): Promise<Blob | null> {
+    const canvas = place.querySelector("canvas");
+    if (!canvas || typeof MediaRecorder === "undefined") return Promise.resolve(null);
+    const recorder = new MediaRecorder(canvas.captureStream(25), { mimeType: "video/webm" });
+    const parts: Blob[] = [];
+    recorder.ondataavailable = (event) => parts.push(event.data);
+    return new Promise((done) => {
+      recorder.onstop = () => done(new Blob(parts, { type: "video/webm" }));
+      recorder.start();
+      setTimeout(() => recorder.stop(), 1000 * seconds);
+    });
+  }
+
+  function under(x_px: number, y_px: number): Vector | null {
+    if (!shown || !planeActor!.getVisibility()) return null;
+    const { width, height } = place.getBoundingClientRect();
+    const ratio = width / Math.max(1, height);
+    const [near, far] = [0, 1].map((z) =>
+      renderer.normalizedDisplayToWorld(x_px / width, 1 - y_px / height, z, ratio),
+    ) as [Vector, Vector];
+    const { x, y, z } = shown.axes;
+    const places = shown.values.shape[1] ?? 1;
+    const plane = y[Math.round(depth * (places - 1))] ?? 0;
+    const share = (plane - near[1]) / (far[1] - near[1] || 1e-12);
+    const at = near.map((start, a) => start + share * (far[a]! - start)) as Vector;
+    const within = (value: number, axis: number[]) => value >= (axis[0] ?? 0) && value <= (axis.at(-1) ?? 0);
+    return within(at[0], x) && within(at[2], z) ? at : null;
+  }
+
+  function seen(): number[] {
+    const from = renderer.getActiveCamera();
+    return [...from.getPosition(), ...from.getFocalPoint(), ...from.getViewUp()];
+  }
+
+  function see(from: number[]): void {
+    const [px, py, pz, fx, fy, fz, ux, uy, uz] = from;
+    if (from.length !== 9 || from.some((part) => !Number.isFinite(part))) return;
+    const camera = renderer.getActiveCamera();
+    camera.setPosition(px!, py!, pz!);
+    camera.setFocalPoint(fx!, fy!, fz!);
+    camera.setViewUp(ux!, uy!, uz!);
+    renderer.resetCameraClippingRange();
+    window3d.render();
+    marks.put();
+  }
+
   function close(): void {
     clearTimeout(timer);
     watch.disconnect();
@@ -233,7 +299,7 @@ export function createScene(place: HTMLElement): Scene3d {
   }
 
   const turning = renderer.getActiveCamera().onModified(() => marks.put());
-  return { load, show, look, move, picture, close };
+  return { load, show, look, move, picture, film, under, seen, see, close };
 }
 
 type Actor = ReturnType<typeof vtkActor.newInstance>;
@@ -285,6 +351,46 @@ function axisMarks(axes: Grid["axes"]): Mark[] {
     { text: "y [m]", at: [right + 2.6 * off, last(y), floor - 2.6 * off] },
     { text: "z [m]", at: [left - 2.8 * off, front - 2.8 * off, last(z)] },
   ];
+}
+
+// A camera that stands further away is drawn here before the room, in parts of the room's depth.
+const NEAREST = 0.45;
+
+/** The camera, on its way to the room where it stands far away, and how far from the wall it really is. */
+function cameraMark(camera: Vector, axes: Grid["axes"]): Mark {
+  const away = (axes.y.at(-1) ?? 1) - camera[1];
+  return { text: `camera, ${away.toFixed(away < 10 ? 1 : 0)} m from the wall`, at: standOf(camera, axes) };
+}
+
+function standOf(camera: Vector, axes: Grid["axes"]): Vector {
+  const [front, back] = [axes.y[0] ?? 0, axes.y.at(-1) ?? 1];
+  const y = Math.max(camera[1], front - NEAREST * (back - front));
+  const middle = (axis: number[]) => ((axis[0] ?? 0) + (axis.at(-1) ?? 1)) / 2;
+  const share = (y - back) / (camera[1] - back || 1);
+  const along = (axis: number[], at: number) => middle(axis) + share * (at - middle(axis));
+  return [along(axes.x, camera[0]), y, along(axes.z, camera[2])];
+}
+
+/** Lines from the camera to the corners of the wall that it looks at. */
+function sightOf(camera: Vector, axes: Grid["axes"]): Actor {
+  const [x0, x1, z0, z1] = [axes.x[0] ?? 0, axes.x.at(-1) ?? 1, axes.z[0] ?? 0, axes.z.at(-1) ?? 1];
+  const back = axes.y.at(-1) ?? 1;
+  const corners = [x0, x1].flatMap((x) => [z0, z1].map((z) => [x, back, z]));
+  const points = [standOf(camera, axes), ...corners].flat();
+  const data = vtkPolyData.newInstance();
+  const places = vtkPoints.newInstance();
+  places.setData(Float32Array.from(points), 3);
+  data.setPoints(places);
+  data.setLines(vtkCellArray.newInstance({ values: Uint32Array.from([1, 2, 3, 4].flatMap((n) => [2, 0, n])) }));
+  const mapper = vtkMapper.newInstance({ scalarVisibility: false });
+  mapper.setInputData(data);
+  const actor = vtkActor.newInstance();
+  actor.setMapper(mapper);
+  actor.getProperty().setColor(0.45, 0.5, 0.56);
+  actor.getProperty().setOpacity(0.5);
+  // What stands before the room makes nobody step back from it.
+  actor.setUseBounds(false);
+  return actor;
 }
 
 const middleOf = (corners: Vector[]) =>

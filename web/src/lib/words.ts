@@ -32,11 +32,58 @@ export function curveName(name: string): string {
 export function resultName(one: ResultLine, spread_k?: number): string {
   const made = one.created ? new Date(one.created) : null;
   const today = made?.toDateString() === new Date().toDateString();
-  const time = made?.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
-  const day = made && !today ? `${made.toLocaleDateString([], { day: "numeric", month: "short" })} ` : "";
+  const time = one.created ? momentOf(one.created).slice(today ? 11 : 0) : "";
   const spread = spread_k === undefined ? "" : `± ${spread_k.toPrecision(2)} K`;
-  return [one.preset ?? "result", time ? `${day}${time}` : "", spread].filter(Boolean).join(", ");
+  return [one.preset ?? "result", time, spread].filter(Boolean).join(", ");
 }
+
+const two = (part: number) => String(part).padStart(2, "0");
+
+/** "2026-11-23 14:05", in the reader's own time; nothing for no time. */
+export function momentOf(created: string | null | undefined): string {
+  const made = created ? new Date(created) : null;
+  if (!made || Number.isNaN(made.getTime())) return "";
+  const day = `${made.getFullYear()}-${two(made.getMonth() + 1)}-${two(made.getDate())}`;
+  return `${day} ${two(made.getHours())}:${two(made.getMinutes())}`;
+}
+
+const FIELDS: Record<string, string> = {
+  T: "temperature",
+  p: "pressure",
+  u: "velocity along x",
+  v: "velocity along y",
+  w: "velocity upwards",
+  speed: "speed",
+  draught_rate: "people bothered by draught",
+  pmv: "warmth vote (PMV)",
+  ppd: "people dissatisfied (PPD)",
+  age: "age of the air",
+  informed: "share known from measurement",
+};
+const PARTS: Record<string, (name: string) => string> = {
+  std: (name) => `${name}: standard deviation`,
+  truth: (name) => `true ${name}`,
+  error: (name) => `${name}: found minus true`,
+  low: (name) => `${name}: lower end, 95 %`,
+  high: (name) => `${name}: upper end, 95 %`,
+};
+
+/** `T_truth` -> "True temperature"; a name that is not known stays. */
+export function fieldName(name: string): string {
+  const [, stem = name, part] = /^(.*?)(?:_(std|truth|error|low|high))?$/.exec(name) ?? [];
+  const words = FIELDS[stem] ?? stem;
+  const told = part ? PARTS[part]!(words) : words;
+  return told.charAt(0).toUpperCase() + told.slice(1);
+}
+
+const KNOWN: Record<string, string> = {
+  surveyed: "surveyed: the openings, and each wall's temperature or that it is insulated",
+  operator: "operator: the openings; nothing of the walls",
+  paper: "paper: temperature, pressure and velocity on one plane",
+};
+
+/** What a level of information means. */
+export const informationWords = (level: string) => KNOWN[level] ?? (level || "nothing noted");
 
 const SETTINGS: Record<string, string> = {
   "scene.solve.grid": "cells of the solver's grid",

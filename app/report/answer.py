@@ -1,0 +1,126 @@
+"""The answer of a report: three sentences without jargon, and what would make it surer."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from app.errors import explained
+from app.report.finding import Finding
+from app.report.indoor import Quantity
+from app.report.indoor import told as line_of
+from core.result import Outcome
+from core.scene import PointSensors, Wall
+
+# Shares of people bothered by draught: what ISO 7730 takes for its categories A, B and C.
+_CATEGORIES = (
+    (10.0, "few people (category A)"),
+    (20.0, "some people (category B)"),
+    (30.0, "many people (category C)"),
+)
+# A camera of fewer pixels, or a mean of fewer frames, sees less than a usual one.
+_PIXELS, _FRAMES = 2000, 100
+
+
+def summary(finding: Finding) -> tuple[str, ...]:
+    """Three sentences: how warm and how fast the air is, what that means for people, and how sure it is."""
+    made = []
+    for say in (_air, _people, _sure):
+        try:
+            made.append(say(finding))
+        except Exception as error:  # a result without one of its sentences is still a result
+            made.append(f"Not told: {explained(error)}")
+    return tuple(made)
+
+
+def advice(finding: Finding) -> tuple[str, ...]:
+    """What to do to know better, the most useful first."""
+    return tuple(_advice(finding))
+
+
+def _air(finding: Finding) -> str:
+    figures = {one.key: one for one in finding.indoor.quantities}
+    levels_k = np.nanmean(finding.solution.temperature_k, axis=(0, 1), dtype=np.float64)
+    higher = f"{abs(levels_k[-1] - levels_k[0]):.1f} K {'warmer' if levels_k[-1] > levels_k[0] else 'colder'}"
+    warm = f"Where people are the air is {_value(figures['temperature_mean'], '°C')} on the mean"
+    moving = ""
+    if "speed_mean" in figures:
+        moving = f" and moves at {_value(figures['speed_mean'], 'm/s')}"
+    return f"{warm}{moving}; at the ceiling it is {higher} than at the floor."
+
+
+def _people(finding: Finding) -> str:
+    figures = {one.key: one for one in finding.indoor.quantities}
+    if "draught_rate_p95" not in figures:
+        return "Its velocity was not found, so nothing is told of draught and ventilation."
+    draught = figures["draught_rate_p95"]
+    who = next((words for limit, words in _CATEGORIES if draught.value < limit), "most people")
+    felt = (
+        f"Its draught bothers {who}: {_value(draught, '%')} in the draughtiest twentieth of the occupied zone"
+    )
+    if "air_changes" not in figures:
+        return f"{felt}."
+    changes, efficiency = figures["air_changes"], figures["efficiency"]
+    mixed = (
+        "better than"
+        if efficiency.value > 55
+        else "worse than"
+        if efficiency.value < 45
+        else "about as well as"
+    )
+    return (
+        f"{felt}; the supply changes the air {_value(changes, 'times an hour')} and ventilates {mixed} "
+        f"a room that is mixed at once (efficiency {_value(efficiency, '%')}, mixed: 50 %)."
+    )
+
+
+def _sure(finding: Finding) -> str:
+    """Against the truth where there is one; else by the deviations."""
+    solution = finding.solution
+    parts = []
+    if solution.temperature_std_k is not None:
+        parts.append(f"temperature to ± {1.96 * float(np.median(solution.temperature_std_k)):.2f} K")
+    if solution.velocity_std_m_s is not None:
+        spread = np.linalg.norm(np.asarray(solution.velocity_std_m_s), axis=-1)
+        parts.append(f"velocity to ± {1.96 * float(np.median(spread)):.2f} m/s")
+    sure = (
+        f"At a usual place it is sure of {' and '.join(parts)} (95 %)." if parts else "It has no intervals."
+    )
+    if finding.scores is None:
+        return f"{sure} There is no truth to compare with; what was taken on trust is listed below."
+    wrong = f"{finding.scores['T']['rms_K']:.2f} K"
+    if finding.scores["u"]:
+        wrong += f" and {100 * finding.scores['u']['rel']:.0f} % of the usual speed"
+    return f"{sure} This room is simulated, so its truth is known: the answer is wrong by {wrong}."
+
+
+def _advice(finding: Finding) -> Iterable[str]:
+    solution, scene = finding.solution, finding.experiment.settings.scene
+    if solution.outcome in (Outcome.step_limit, Outcome.time_limit, Outcome.nonfinite):
+        yield f"The solve did not come to its end. {solution.outcome.value}"
+    yield from (note for note in finding.manifest.get("assumed", ()) if "istrust" in note)
+    if solution.velocity_m_s is None:
+        yield "Reconstruct with the preset standard: it finds the velocity as well."
+    if not any(isinstance(part, PointSensors) for part in scene.boundary):
+        yield "Hang two thermometers at two heights: the level of the temperature comes from them."
+    unknown = [part.wall for part in scene.boundary if isinstance(part, Wall) and part.thermal == "unknown"]
+    if unknown:
+        walls = ", ".join(unknown)
+        yield f"Measure the walls {walls}, or say that they are insulated: nothing is stated of their heat."
+    view = scene.views[0]
+    if view.frames < _FRAMES:
+        yield f"Average {_FRAMES} frames in each capture instead of {view.frames}: the noise falls with their root."
+    if view.camera.width_px < _PIXELS:
+        yield f"Take a camera of more than {view.camera.width_px} pixels' width: it sees smaller shifts."
+    if finding.experiment.settings.scene.solve.grid != "auto":
+        yield (
+            f"Solve on a finer grid than {scene.solve.grid} cells (scene.solve.grid, or the preset reference): "
+            "a coarse one smears the jet."
+        )
+
+
+def _value(one: Quantity, unit: str) -> str:
+    """A figure with its interval, as people read it."""
+    _, value, interval = line_of(one)
+    number = value.split(" ")[0]
+    between = "" if interval == "-" else f" ({interval.removesuffix(' ' + one.unit).strip()})"
+    return f"{number} {unit}{between}"

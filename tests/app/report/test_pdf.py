@@ -1,0 +1,50 @@
+"""The report to hand on: three sentences for an answer, what would make it surer, and two pages of PDF."""
+
+import re
+
+import pytest
+from typer.testing import CliRunner
+
+from app.cli import create_cli
+from app.report.answer import advice, summary
+from app.report.finding import read_finding
+from app.report.pdf import write_pdf
+from tests.app.report.test_indoor import experiment  # noqa: F401
+
+
+def pages(content: bytes) -> int:
+    return len(re.findall(rb"/Type /Page\b", content))
+
+
+@pytest.fixture(scope="module")
+def finding(experiment):  # noqa: F811
+    return read_finding(experiment, experiment.results_folder / "one")
+
+
+def test_the_answer_is_three_sentences_without_jargon(finding):
+    said = summary(finding)
+    assert len(said) == 3
+    # 295 K at the floor and 2 K/m: 21.85 °C, and vertices from 0.3 to 1.7 m, 1.0 m on the mean, are in the zone.
+    assert "23.9 °C" in said[0]
+    assert "0.1 m/s" in said[0]
+    assert "90 times an hour" in said[1]
+    assert "no truth" in said[2]
+    assert not any(word in " ".join(said) for word in ("rms", "sigma", "posterior", "px"))
+
+
+def test_a_room_without_thermometers_is_told_to_hang_them(finding):
+    assert any("thermometers" in sentence for sentence in advice(finding))
+
+
+def test_the_pdf_has_two_pages_with_pictures(finding, tmp_path):
+    write_pdf(finding, tmp_path / "report.pdf")
+    content = (tmp_path / "report.pdf").read_bytes()
+    assert content.startswith(b"%PDF")
+    assert pages(content) == 2
+    assert content.count(b"/Subtype /Image") >= 3
+
+
+def test_the_command_writes_it(experiment):  # noqa: F811
+    ran = CliRunner().invoke(create_cli(), ["report", str(experiment.folder), "--pdf"])
+    assert ran.exit_code == 0, ran.output
+    assert pages((experiment.results_folder / "one" / "result-export.pdf").read_bytes()) == 2

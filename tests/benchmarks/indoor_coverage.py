@@ -1,0 +1,90 @@
+"""How often the 95 % intervals of draught, PMV, PPD, speed and age of the air hold rooms whose truth is known.
+
+Each room is solved from computed shifts with misread entries, as `tests.benchmarks.coverage` does; then the figures
+and maps are worked out of the result and of the truth. One JSON line a room: the share of inner points of each map
+whose true value is in its interval (a draught rate or a speed of nothing counts as held where the interval begins at
+nothing), and of the table's figures those that are not held.
+
+    python -m tests.benchmarks.indoor_coverage A.npz C.npz --cells 32 --coarse 21
+"""
+
+import argparse
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from app.bench.room_fit import problem_of
+from app.reconstruct.problem import with_scene
+from app.report.indoor import indoor
+from app.report.maps import derived_maps
+from app.volume.file import RoomVolume
+from app.volume.misread import misread
+from app.volume.score import coverage, score_solution, truth_at
+from core.metrics import inner
+from core.result import Solution
+from core.solve.room import RoomSettings, solve_room
+
+# A figure is held where the truth lies beyond its interval by less than the last digit that is told.
+_DIGITS = 1e-3
+
+
+def of_the_truth(truth: RoomVolume, found: Solution) -> Solution:
+    """The truth on the result's vertices, without deviations."""
+    velocity = np.stack([truth_at(truth, found, truth.velocity_m_s[..., a]) for a in range(3)], axis=-1)
+    kelvin = truth_at(truth, found, truth.temperature_k)
+    return Solution(found.x_m, found.y_m, found.z_m, kelvin, velocity_m_s=velocity)
+
+
+def row_of(found: Solution, truth: RoomVolume, scene) -> dict:
+    """Shares of points held, and the table's figures that are not."""
+    true = of_the_truth(truth, found)
+    true_maps = {one.name: one.values for one in derived_maps(true, scene)}
+    held = {}
+    for one in derived_maps(found, scene):
+        if one.low is not None and one.high is not None:
+            value, slack = true_maps[one.name], _DIGITS * float(np.ptp(one.values))
+            held[one.name] = float(np.mean(inner((value >= one.low - slack) & (value <= one.high + slack))))
+    real = {one.key: one.value for one in indoor(true, scene).quantities}
+    table = [one for one in indoor(found, scene).quantities if one.low is not None and one.key in real]
+    missed = {
+        one.key: [real[one.key], one.low, one.high]
+        for one in table
+        if not one.low - _DIGITS * abs(one.value) <= real[one.key] <= one.high + _DIGITS * abs(one.value)
+    }
+    return {"held": held, "figures": len(table), "figures_missed": missed}
+
+
+def main() -> None:
+    """A row for every room and seed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("truth", type=Path, nargs="+")
+    parser.add_argument("--information", default="surveyed")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
+    parser.add_argument("--cells", type=int, default=32)
+    parser.add_argument("--coarse", type=int, default=21)
+    options = parser.parse_args()
+    settings = RoomSettings(cells=options.cells, coarse_cells=options.coarse)
+    for path in options.truth:
+        for seed in options.seeds:
+            began_s = time.process_time()
+            problem, truth = problem_of(path, options.information, "texture", "paper", seed)
+            exact = problem.scene
+            problem = with_scene(problem, misread(exact, seed))
+            found = solve_room(problem, settings)
+            row = {
+                "truth": path.stem,
+                "information": options.information,
+                "seed": seed,
+                "cells": options.cells,
+            }
+            row |= {"u_rel": score_solution(found, truth)["u"]["rel"], **coverage(found, truth)}
+            row |= row_of(replace(found, history=()), truth, exact)
+            row["cpu_s"] = time.process_time() - began_s
+            print(json.dumps(row), flush=True)
+
+
+if __name__ == "__main__":
+    main()
