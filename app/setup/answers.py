@@ -26,20 +26,20 @@ class CameraAnswer(Strict):
     packaged room, `sample`.
     """
 
-    kind: Literal["v4l2", "simulated"]
-    """A camera of the kernel, or one that computes its pictures."""
+    kind: Literal["v4l2", "aravis", "simulated"]
+    """A camera of the kernel, one of GigE Vision or USB3 Vision, or one that computes its pictures."""
     device: str = "/dev/video0"
-    """Its device file; `airlens devices` lists them."""
+    """Its device file, id or address; `airlens devices` lists them."""
     pixel_format: str = "Y16"
-    """Raw or grey format, as the kernel names it."""
+    """Raw or grey format, as the camera names it."""
     bits: Annotated[int, Field(ge=1, le=16)] = 12
     """Digits of a count."""
     width_px: Pixels
     """Columns."""
     height_px: Pixels
     """Rows."""
-    exposure: Time = 0.02
-    """Exposure of a frame."""
+    exposure: Time | None = None
+    """Exposure of a frame; the camera's own unless given."""
     frames: Annotated[int, Field(ge=1, le=100_000)] = 100
     """How many frames are averaged into one picture."""
     angle_of_view: Angle | None = None

@@ -5,6 +5,7 @@ import math
 from app.errors import BadInputError
 from app.experiment.folder import ExperimentSettings
 from app.experiment.rig_settings import (
+    AravisCameraSettings,
     ProjectorSettings,
     RigSettings,
     SimulatedCameraSettings,
@@ -85,6 +86,15 @@ def picture_on_wall_m(optics: Optics, room: Box) -> tuple[float, float]:
     ]
 
 
+def picture_told(scene: Scene) -> str:
+    """How much of the patterned wall the camera sees, as a sentence."""
+    width_m, height_m = picture_on_wall_m(scene.views[0].camera, scene.room)
+    return (
+        f"the camera sees {width_m:.2f} x {height_m:.2f} m of a wall of "
+        f"{scene.room.size_m[0]:g} x {scene.room.size_m[2]:g} m."
+    )
+
+
 def _optics(camera: CameraAnswer, room: Box) -> Optics:
     """Straight at the patterned wall; from its middle where only the distance is told."""
     back_m = room.upper_m[1]
@@ -126,16 +136,20 @@ def _light(answers: Answers, camera: Optics, room: Box) -> Light:
 def _rig(answers: Answers) -> RigSettings:
     camera, projector = answers.camera, answers.projector
     if camera.kind == "simulated":
-        device = SimulatedCameraSettings(room=TRUTH_FILE, exposure_s=camera.exposure)
+        told = {"room": TRUTH_FILE} | ({} if camera.exposure is None else {"exposure_s": camera.exposure})
+        device = SimulatedCameraSettings.model_validate(told)
     else:
-        device = V4l2CameraSettings(
-            kind="v4l2",
-            device=camera.device,
-            pixel_format=camera.pixel_format,
-            width_px=camera.width_px,
-            height_px=camera.height_px,
-            bits=camera.bits,
-            exposure_s=camera.exposure,
+        told = {
+            "kind": camera.kind,
+            "device": camera.device,
+            "pixel_format": camera.pixel_format,
+            "width_px": camera.width_px,
+            "height_px": camera.height_px,
+            "bits": camera.bits,
+            "exposure_s": camera.exposure,
+        }
+        device = (AravisCameraSettings if camera.kind == "aravis" else V4l2CameraSettings).model_validate(
+            told
         )
     spoken = ProjectorSettings(url=projector.url) if projector and projector.url else None
     return RigSettings(camera=device, projector=spoken)

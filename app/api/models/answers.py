@@ -16,10 +16,19 @@ class TemplateResource(Strict):
     answers: dict[str, Any]
 
 
+class FoundFormat(Strict):
+    """A format of a camera, at one size."""
+
+    pixel_format: str
+    bits: int
+    width_px: int
+    height_px: int
+
+
 class FoundCamera(Strict):
     """A camera to choose, with what it would be asked for; `error` says why it cannot be used."""
 
-    kind: Literal["v4l2", "simulated"]
+    kind: Literal["v4l2", "aravis", "simulated"]
     device: str
     name: str
     pixel_format: str
@@ -27,6 +36,29 @@ class FoundCamera(Strict):
     width_px: int
     height_px: int
     error: str = ""
+    formats: tuple[FoundFormat, ...] = ()
+
+
+class FoundPort(Strict):
+    """A serial port, as the system describes it."""
+
+    device: str
+    description: str
+
+
+class AskPort(Strict):
+    """A serial port that was listed."""
+
+    device: str = Field(max_length=1000)
+
+
+class PortAnswer(Strict):
+    """Who answered on a port: the address to speak to it by, its name, its power state."""
+
+    found: bool
+    url: str = ""
+    name: str = ""
+    power: str = ""
 
 
 class SentAnswers(Strict):

@@ -258,11 +258,71 @@ export interface paths {
         };
         /**
          * List Found Cameras
-         * @description List the cameras that are plugged in, and the simulated one.
+         * @description List the cameras that are plugged in, and simulated ones: in the packaged room, and in uploaded ones.
          */
         get: operations["list_found_cameras_api_devices_found_get"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/devices/found/picture": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read Found Picture
+         * @description Return one picture of a camera that was found, for the eyes: is it this one?
+         */
+        get: operations["read_found_picture_api_devices_found_picture_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/devices/ports": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Ports
+         * @description List the serial ports; none is opened.
+         */
+        get: operations["list_ports_api_devices_ports_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/devices/ports/ask": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Ask Port
+         * @description Ask a serial port which projector is there: its power state and its name; nothing is switched.
+         */
+        post: operations["ask_port_api_devices_ports_ask_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -673,6 +733,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/experiments/{experiment}/captures/imported": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import Captures
+         * @description Make captures of uploaded pictures that another camera took; the uploads are removed.
+         */
+        post: operations["import_captures_api_experiments__experiment__captures_imported_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/experiments/{experiment}/captures/{capture}": {
         parameters: {
             query?: never;
@@ -773,6 +853,86 @@ export interface paths {
          * @description Return the newest plan; a job of kind `plan` makes it.
          */
         get: operations["read_plan_api_experiments__experiment__plan_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment}/prints": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Prints
+         * @description List what was printed: the pattern, the board.
+         */
+        get: operations["list_prints_api_experiments__experiment__prints_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment}/prints/board": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Print Board
+         * @description Make the PDF of a board; it becomes the rig's where the rig names none.
+         */
+        post: operations["print_board_api_experiments__experiment__prints_board_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment}/prints/pattern": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Print Pattern
+         * @description Make the PDF of the wall's pattern.
+         */
+        post: operations["print_pattern_api_experiments__experiment__prints_pattern_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment}/prints/{what}/pdf": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read Print
+         * @description Return the PDF that was made last.
+         */
+        get: operations["read_print_api_experiments__experiment__prints__what__pdf_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -1246,6 +1406,14 @@ export interface components {
             revision: string;
         };
         /**
+         * AskPort
+         * @description A serial port that was listed.
+         */
+        AskPort: {
+            /** Device */
+            device: string;
+        };
+        /**
          * BoardGeometry
          * @description A board: inner corners of a chessboard, squares of a ChArUco board, circles.
          */
@@ -1547,6 +1715,7 @@ export interface components {
              * @enum {string}
              */
             light: "texture" | "projector";
+            next?: components["schemas"]["NextResource"] | null;
             /** Planned */
             planned: boolean;
             /** Projector */
@@ -1587,6 +1756,7 @@ export interface components {
              * @enum {string}
              */
             light: "texture" | "projector";
+            next?: components["schemas"]["NextResource"] | null;
             /** Planned */
             planned: boolean;
             /** Projector */
@@ -1660,19 +1830,48 @@ export interface components {
              * @default
              */
             error?: string;
+            /**
+             * Formats
+             * @default []
+             */
+            formats?: components["schemas"]["FoundFormat"][];
             /** Height Px */
             height_px: number;
             /**
              * Kind
              * @enum {string}
              */
-            kind: "v4l2" | "simulated";
+            kind: "v4l2" | "aravis" | "simulated";
             /** Name */
             name: string;
             /** Pixel Format */
             pixel_format: string;
             /** Width Px */
             width_px: number;
+        };
+        /**
+         * FoundFormat
+         * @description A format of a camera, at one size.
+         */
+        FoundFormat: {
+            /** Bits */
+            bits: number;
+            /** Height Px */
+            height_px: number;
+            /** Pixel Format */
+            pixel_format: string;
+            /** Width Px */
+            width_px: number;
+        };
+        /**
+         * FoundPort
+         * @description A serial port, as the system describes it.
+         */
+        FoundPort: {
+            /** Description */
+            description: string;
+            /** Device */
+            device: string;
         };
         /**
          * GuideRequest
@@ -1901,6 +2100,18 @@ export interface components {
             };
         };
         /**
+         * NewBoard
+         * @description A board to calibrate with: the rig's own unless given. Without `square_m` the largest that fits the paper.
+         */
+        NewBoard: {
+            board?: components["schemas"]["BoardGeometry"] | null;
+            /**
+             * Paper
+             * @default a3
+             */
+            paper?: string;
+        };
+        /**
          * NewCalibration
          * @description A simulated rig takes its models from its scene; a real one is calibrated on the command line.
          */
@@ -2004,6 +2215,18 @@ export interface components {
             title?: string;
         };
         /**
+         * NewImport
+         * @description Pictures that another camera took. `bits` are those of the counts where the files hold more.
+         */
+        NewImport: {
+            /** Ambient Temperature K */
+            ambient_temperature_k?: number | null;
+            /** Bits */
+            bits?: number | null;
+            /** Pictures */
+            pictures: components["schemas"]["RolePictures"][];
+        };
+        /**
          * NewJob
          * @description What to compute. The same `key` twice gives the first job, so that a request may be repeated.
          */
@@ -2030,6 +2253,42 @@ export interface components {
              * @default
              */
             title?: string;
+        };
+        /**
+         * NewPattern
+         * @description Sheets of the wall's pattern; `choose` first gives the scene the finest pattern that suits its camera.
+         */
+        NewPattern: {
+            /**
+             * Choose
+             * @default false
+             */
+            choose?: boolean;
+            /**
+             * Overlap M
+             * @default 0.01
+             */
+            overlap_m?: number;
+            /**
+             * Paper
+             * @default a3
+             */
+            paper?: string;
+        };
+        /**
+         * NextResource
+         * @description The first step of the work that is not done, the command that does it, and why.
+         */
+        NextResource: {
+            /** Command */
+            command: string;
+            /** Reason */
+            reason: string;
+            /**
+             * Step
+             * @enum {string}
+             */
+            step: "camera" | "plan" | "print pattern" | "print board" | "calibrate" | "reference" | "flow" | "reconstruct" | "report" | "export";
         };
         /**
          * OpenCamera
@@ -2082,6 +2341,29 @@ export interface components {
             views: components["schemas"]["ViewLine"][];
         };
         /**
+         * PortAnswer
+         * @description Who answered on a port: the address to speak to it by, its name, its power state.
+         */
+        PortAnswer: {
+            /** Found */
+            found: boolean;
+            /**
+             * Name
+             * @default
+             */
+            name?: string;
+            /**
+             * Power
+             * @default
+             */
+            power?: string;
+            /**
+             * Url
+             * @default
+             */
+            url?: string;
+        };
+        /**
          * PresetLine
          * @description What a preset would cost and find; null where nothing predicts it. `fits` is false where it would refuse.
          */
@@ -2112,6 +2394,33 @@ export interface components {
             about: string;
             /** Preset */
             preset: string;
+        };
+        /**
+         * PrintedResource
+         * @description A PDF that was made: rows and columns of its sheets, what is on them, and the finest period.
+         */
+        PrintedResource: {
+            /** Created */
+            created: string;
+            /** Finest Period Camera Px */
+            finest_period_camera_px: number | null;
+            /** Finest Period M */
+            finest_period_m: number | null;
+            /** Height M */
+            height_m: number;
+            /** Is Of The Scene */
+            is_of_the_scene: boolean;
+            /** Paper */
+            paper: string;
+            /** Sheets */
+            sheets: number[];
+            /**
+             * What
+             * @enum {string}
+             */
+            what: "pattern" | "board";
+            /** Width M */
+            width_m: number;
         };
         /**
          * Problem
@@ -2280,6 +2589,19 @@ export interface components {
             y_m: number[];
             /** Z M */
             z_m: number[];
+        };
+        /**
+         * RolePictures
+         * @description Uploaded pictures of one role: each upload is a picture, or a TIFF of many.
+         */
+        RolePictures: {
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "reference" | "flow" | "dark" | "flat";
+            /** Uploads */
+            uploads: string[];
         };
         /**
          * RoomTold
@@ -2485,7 +2807,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "png" | "tiff" | "npy" | "npz" | "broken";
+            kind: "png" | "jpeg" | "tiff" | "npy" | "npz" | "broken";
             /**
              * Reason
              * @default
@@ -2627,6 +2949,7 @@ export type About = components['schemas']['About'];
 export type AddressLine = components['schemas']['AddressLine'];
 export type AddressesResource = components['schemas']['AddressesResource'];
 export type AnswersResource = components['schemas']['AnswersResource'];
+export type AskPort = components['schemas']['AskPort'];
 export type BoardGeometry = components['schemas']['BoardGeometry'];
 export type CalibrationItem = components['schemas']['CalibrationItem'];
 export type CalibrationResource = components['schemas']['CalibrationResource'];
@@ -2647,6 +2970,8 @@ export type ExperimentResource = components['schemas']['ExperimentResource'];
 export type FieldError = components['schemas']['FieldError'];
 export type FieldResource = components['schemas']['FieldResource'];
 export type FoundCamera = components['schemas']['FoundCamera'];
+export type FoundFormat = components['schemas']['FoundFormat'];
+export type FoundPort = components['schemas']['FoundPort'];
 export type GuideRequest = components['schemas']['GuideRequest'];
 export type GuideResource = components['schemas']['GuideResource'];
 export type GuideView = components['schemas']['GuideView'];
@@ -2656,21 +2981,28 @@ export type JobResource = components['schemas']['JobResource'];
 export type MapLine = components['schemas']['MapLine'];
 export type MistakeResource = components['schemas']['MistakeResource'];
 export type NewAnswers = components['schemas']['NewAnswers'];
+export type NewBoard = components['schemas']['NewBoard'];
 export type NewCalibration = components['schemas']['NewCalibration'];
 export type NewCapture = components['schemas']['NewCapture'];
 export type NewExperiment = components['schemas']['NewExperiment'];
+export type NewImport = components['schemas']['NewImport'];
 export type NewJob = components['schemas']['NewJob'];
+export type NewPattern = components['schemas']['NewPattern'];
+export type NextResource = components['schemas']['NextResource'];
 export type OpenCamera = components['schemas']['OpenCamera'];
 export type OpenProjector = components['schemas']['OpenProjector'];
 export type Plan = components['schemas']['Plan'];
+export type PortAnswer = components['schemas']['PortAnswer'];
 export type PresetLine = components['schemas']['PresetLine'];
 export type PresetResource = components['schemas']['PresetResource'];
+export type PrintedResource = components['schemas']['PrintedResource'];
 export type Problem = components['schemas']['Problem'];
 export type ProjectorChange = components['schemas']['ProjectorChange'];
 export type ProjectorResource = components['schemas']['ProjectorResource'];
 export type ReadingResource = components['schemas']['ReadingResource'];
 export type ResultLine = components['schemas']['ResultLine'];
 export type ResultResource = components['schemas']['ResultResource'];
+export type RolePictures = components['schemas']['RolePictures'];
 export type RoomTold = components['schemas']['RoomTold'];
 export type ScoreResource = components['schemas']['ScoreResource'];
 export type ScreenResource = components['schemas']['ScreenResource'];
@@ -3223,6 +3555,130 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["FoundCamera"][];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "5XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_found_picture_api_devices_found_picture_get: {
+        parameters: {
+            query: {
+                kind: "v4l2" | "aravis" | "simulated";
+                device: string;
+                pixel_format: string;
+                width_px: number;
+                height_px: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description What the camera sees, its contrast stretched for the eyes. */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/jpeg": string;
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "5XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_ports_api_devices_ports_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FoundPort"][];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "5XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    ask_port_api_devices_ports_ask_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["AskPort"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PortAnswer"];
                 };
             };
             /** @description What happened, why, and what to do. */
@@ -4473,6 +4929,51 @@ export interface operations {
             };
         };
     };
+    import_captures_api_experiments__experiment__captures_imported_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description An id that the service gave. */
+                experiment: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewImport"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CaptureResource"][];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "5XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     read_capture_api_experiments__experiment__captures__capture__get: {
         parameters: {
             query?: never;
@@ -4763,6 +5264,179 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Plan"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "5XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_prints_api_experiments__experiment__prints_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description An id that the service gave. */
+                experiment: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PrintedResource"][];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "5XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    print_board_api_experiments__experiment__prints_board_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description An id that the service gave. */
+                experiment: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewBoard"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PrintedResource"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "5XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    print_pattern_api_experiments__experiment__prints_pattern_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description An id that the service gave. */
+                experiment: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewPattern"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PrintedResource"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "4XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What happened, why, and what to do. */
+            "5XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_print_api_experiments__experiment__prints__what__pdf_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description An id that the service gave. */
+                experiment: string;
+                what: "pattern" | "board";
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Sheets at true scale: print them at 100 %. */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/pdf": string;
                 };
             };
             /** @description What happened, why, and what to do. */
