@@ -1,8 +1,10 @@
 """Takes a picture of every page, in light and dark, at three sizes, for somebody to look at.
 
     python -m tests.browser.gallery FOLDER [--plan]
+    python -m tests.browser.gallery --readme web/page.png
 
-A simulated rig lit by its projector, calibrated, with captures, two results, a job and (--plan) a plan.
+A simulated rig lit by its projector, calibrated, with captures, two results, a job and (--plan) a plan. For the
+README: Look alone, at the packaged room with some noise.
 """
 
 import argparse
@@ -10,11 +12,11 @@ import tempfile
 import time
 from pathlib import Path
 
-from playwright.sync_api import Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from app.client import Client
 from tests.browser.conftest import CHROMIUM, FLAGS, Station
-from tests.browser.test_look import keep, room
+from tests.browser.test_look import PAINTED, keep, room
 
 PAGES = ("Rig", "Calibrate", "Plan", "Capture", "Reconstruct", "Look")
 SIZES = ((390, 844), (1024, 768), (1440, 900))
@@ -44,6 +46,20 @@ def furnish(station: Station, planned: bool) -> None:
         keep(experiment, "20260102T000000-draft", room(), "draft", 3.0)
 
 
+def shoot_for_readme(browser: Browser, station: Station, picture: Path) -> None:
+    """The page Look of one result."""
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=300) as client:
+        made = client.create_experiment("Room with a warm jet", camera_px=64).experiment
+    keep(station.app.state.services.folders.open(made), "20260101T000000-standard", room(), "standard", 1.0)
+    page = browser.new_page(viewport={"width": 1280, "height": 860}, color_scheme="light", bypass_csp=True)
+    page.goto(station.address)
+    page.locator("nav").get_by_role("button", name="Look").click()
+    expect(page.locator("main")).to_have_attribute("aria-label", "Look")
+    expect(page.locator(".slice canvas").first).to_have_attribute("data-painted", PAINTED)
+    page.wait_for_timeout(10_000)
+    page.screenshot(path=str(picture))
+
+
 def shoot(page: Page, folder: Path, name: str) -> None:
     """Every page, whole; sticky parts where they are at the top."""
     page.goto(page.url.split("#")[0] + "#/new")
@@ -62,27 +78,38 @@ def shoot(page: Page, folder: Path, name: str) -> None:
             page.evaluate("document.head.lastElementChild.remove()")
 
 
+def shoot_all(browser: Browser, station: Station, folder: Path) -> None:
+    """Every page in both themes at every size."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for theme in ("light", "dark"):
+        for width, height in SIZES:
+            page = browser.new_page(
+                viewport={"width": width, "height": height}, color_scheme=theme, bypass_csp=True
+            )
+            page.goto(station.address)
+            expect(page.locator("footer")).to_contain_text("service connected")
+            shoot(page, folder, f"{theme}-{width}")
+            page.close()
+
+
 def main() -> None:
     """Parse the options and take the pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--plan", action="store_true")
+    parser.add_argument("--readme", type=Path, help="only the picture of README, to this file")
     options = parser.parse_args()
-    options.folder.mkdir(parents=True, exist_ok=True)
+    if options.folder is None and options.readme is None:
+        parser.error("give a folder, or --readme with a file")
     with tempfile.TemporaryDirectory() as data, sync_playwright() as playwright:
         station = Station(Path(data))
         station.start()
-        furnish(station, options.plan)
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        for theme in ("light", "dark"):
-            for width, height in SIZES:
-                page = browser.new_page(
-                    viewport={"width": width, "height": height}, color_scheme=theme, bypass_csp=True
-                )
-                page.goto(station.address)
-                expect(page.locator("footer")).to_contain_text("service connected")
-                shoot(page, options.folder, f"{theme}-{width}")
-                page.close()
+        if options.readme is not None:
+            shoot_for_readme(browser, station, options.readme)
+        else:
+            furnish(station, options.plan)
+            shoot_all(browser, station, options.folder)
         browser.close()
         station.stop()
 

@@ -45,8 +45,13 @@ def test_what_a_running_job_has_not_taken_yet_is_not_free(job: Job, engine: Loca
 
 
 def test_what_a_running_job_has_taken_is_not_counted_twice(job: Job, engine: LocalEngine):
-    taken = running(job, psutil.Process().memory_info().rss // 2)
-    assert memory_shortage(job, [taken] * 4, engine, NO_RESERVE) == ""
+    held_bytes = psutil.Process().memory_info().rss
+    taken = running(job, held_bytes // 2)
+    many = [taken] * (2 * FREE_BYTES // held_bytes + 1)
+    assert memory_shortage(job, many, engine, NO_RESERVE) == ""
+    # Nor is what it took beyond its promise given to another job.
+    greedy = replace(job, memory_bytes=5 * FREE_BYTES // 4)
+    assert "Waiting for memory" in memory_shortage(greedy, many, engine, NO_RESERVE)
     # A job that has not begun has no process to ask, and holds nothing.
     waiting = replace(taken, handle=None, memory_bytes=4 * FREE_BYTES)
     assert memory_shortage(job, [waiting], engine, NO_RESERVE) == ""
