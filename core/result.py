@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
+from typing import cast
 
 import equinox as eqx
 import numpy as np
@@ -73,7 +74,8 @@ class Solution(eqx.Module):
         if self.air.all():
             return self
         solid = ~self.air
-        places = tuple(ndimage.distance_transform_edt(solid, return_distances=False, return_indices=True))
+        nearest = ndimage.distance_transform_edt(solid, return_distances=False, return_indices=True)
+        places = tuple(cast("np.ndarray", nearest))
         fields = {name: getattr(self, name) for name in _FIELDS}
         full = {name: None if field is None else field[places] for name, field in fields.items()}
         if self.velocity_m_s is not None:

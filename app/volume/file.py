@@ -8,7 +8,7 @@ u in m/s with the last axis x, y, z. `solid` marks vertices in or on obstacles, 
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -115,7 +115,7 @@ def filled(
 ) -> Float[np.ndarray, "nx ny nz ..."]:
     """The field with the nearest air's values in solid vertices."""
     places = ndimage.distance_transform_edt(solid, return_distances=False, return_indices=True)
-    return field[tuple(places)]
+    return field[tuple(cast("np.ndarray", places))]
 
 
 def _solid(arrays: dict[str, np.ndarray], case: dict[str, Any], axes_m: Axes) -> np.ndarray | None:

@@ -32,7 +32,7 @@ export function openingsOf(settings: unknown): Opening[] {
   if (!scene) return [];
   const parts = (scene.boundary ?? []).filter((one) => one.patch && isNamed(one.kind));
   const openings = parts.map((one): Opening => {
-    const kind = one.kind as Opening["kind"];
+    const kind = one.kind as keyof typeof NAMES;
     const alike = parts.filter((other) => other.kind === kind);
     const number = alike.length > 1 ? ` ${alike.indexOf(one) + 1}` : "";
     return { kind, label: `${NAMES[kind]}${number}`, corners: cornersOf(one.patch!, scene.room) };
