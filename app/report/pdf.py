@@ -13,6 +13,7 @@ from reportlab.lib.units import mm
 from reportlab.platypus import (
     Flowable,
     Image,
+    KeepInFrame,
     PageBreak,
     Paragraph,
     SimpleDocTemplate,
@@ -68,7 +69,13 @@ def write_pdf(finding: Finding, path: Path) -> None:
         str(path), pagesize=A4, leftMargin=15 * mm, rightMargin=15 * mm, topMargin=13 * mm, bottomMargin=12 * mm,
         title=f"{title}: the air", author="airlens",
     )  # fmt: skip
-    document.build([*_first(finding, title), PageBreak(), *_second(finding)])
+    # A frame has 6 points of padding on each side; what is too much for its page is drawn smaller.
+    width, height = document.width - 12, document.height - 14
+    first, second = (
+        KeepInFrame(width, height, list(page), mode="shrink")
+        for page in (_first(finding, title), _second(finding))
+    )
+    document.build([first, PageBreak(), second])
 
 
 def _first(finding: Finding, title: str) -> Iterable[Flowable]:
