@@ -11,7 +11,7 @@ COMMANDS = {
     ),
     "new": (
         "app.commands.new",
-        "Make an experiment for your rig and room from answers that a tape measure and a thermometer give.",
+        "Make an experiment for your rig and room: asked question by question, or from a file of answers.",
     ),
     "devices": (
         "app.commands.devices",

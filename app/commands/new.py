@@ -2,9 +2,13 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from app.experiment.folder import Experiment
+    from app.interview.conversation import Question
 
 
 def register(cli: typer.Typer) -> None:
@@ -24,21 +28,68 @@ def new(
         ),
     ] = "",
 ) -> None:
-    """Make an experiment for your rig and room from answers that a tape measure and a thermometer give."""
+    """Make an experiment for your rig and room: asked question by question, or from a file of answers."""
     from app.errors import BadInputError
     from app.setup.experiment import new_experiment
     from app.setup.experiment import template as template_text
+    from app.whereabouts import next_step
 
     if template:
         typer.echo(template_text(template), nl=False)
         return
-    if experiment is None or not source:
+    if experiment is None:
         raise BadInputError(
-            "Answers are missing. Print some with `airlens new --template wall-jet > answers.toml`, change them to "
-            "your room, then: airlens new EXPERIMENT --from answers.toml"
+            "The experiment's folder is missing. `airlens new EXPERIMENT` asks for everything; with a file of "
+            "answers: airlens new --template wall-jet > answers.toml, change it, airlens new EXPERIMENT --from "
+            "answers.toml"
         )
-    made = new_experiment(experiment, _text(source), "standard input" if source == "-" else source)
-    typer.echo(f"{made.folder}: {_told(made)} Next: airlens preview {made.folder}")
+    if source:
+        made = new_experiment(experiment, _text(source), "standard input" if source == "-" else source)
+    else:
+        made = _asked(experiment)
+    typer.echo(f"{made.folder}: {_told(made)} Next: {next_step(made, str(made.folder)).command}")
+
+
+def _asked(folder: Path) -> "Experiment":
+    from app.errors import BadInputError
+    from app.interview.conversation import Piped
+    from app.interview.talk import talk
+
+    person = _Terminal() if sys.stdin.isatty() else Piped(sys.stdin.readline)
+    try:
+        return talk(folder, person)
+    except EOFError as end:
+        raise BadInputError(
+            f"The answers ended before {str(end)!r}. They are kept; `airlens new {folder}` goes on there. "
+            "`airlens new --template wall-jet` prints a file to fill in instead."
+        ) from None
+    except KeyboardInterrupt:
+        typer.echo(f"\nWhat was answered is kept; `airlens new {folder}` goes on there.", err=True)
+        raise typer.Exit(130) from None
+
+
+class _Terminal:
+    """A person at a terminal."""
+
+    def hear(self, question: "Question") -> str:
+        """Show the question, its options and its default; read a line."""
+        for number, option in enumerate(question.options, 1):
+            typer.echo(f"  {number}. {option}")
+        typer.echo(
+            f"{question.text} [{question.default}]: " if question.default else f"{question.text}: ", nl=False
+        )
+        line = sys.stdin.readline()
+        if not line:
+            raise EOFError(question.text)
+        return line
+
+    def say(self, text: str) -> None:
+        """Show a text."""
+        typer.echo(text)
+
+    def refuse(self, question: "Question | None", reason: str) -> None:
+        """Show what is wrong; the question comes again."""
+        typer.echo(reason)
 
 
 def _text(source: str) -> str:
@@ -46,7 +97,8 @@ def _text(source: str) -> str:
     from app.files.reading import reading
 
     path = Path(source)
-    if source != "-" and not path.is_file():
+    # A pipe is a file too: --from <(program).
+    if source != "-" and (path.is_dir() or not path.exists()):
         raise BadInputError(
             f"There is no file {source}. `airlens new --template wall-jet` prints one to fill in."
         )
@@ -54,16 +106,12 @@ def _text(source: str) -> str:
         return sys.stdin.read() if source == "-" else path.read_text(encoding="utf-8")
 
 
-def _told(made) -> str:
-    from app.setup.scene import picture_on_wall_m
+def _told(made: "Experiment") -> str:
+    from app.setup.scene import picture_told
     from core.scene import Inlet
 
     scene = made.settings.scene
-    width_m, height_m = picture_on_wall_m(scene.views[0].camera, scene.room)
-    parts = [
-        f"the camera sees {width_m:.2f} x {height_m:.2f} m of a wall of "
-        f"{scene.room.size_m[0]:g} x {scene.room.size_m[2]:g} m."
-    ]
+    parts = [picture_told(scene)]
     for item in scene.boundary:
         if isinstance(item, Inlet):
             speed_m_s = sum(v * v for v in item.velocity_m_s) ** 0.5

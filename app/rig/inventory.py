@@ -11,8 +11,23 @@ from drivers.v4l2.inventory import DeviceDescription
 
 
 @dataclass(frozen=True)
+class FormatChoice:
+    """A grey format that airlens reads, at one size."""
+
+    pixel_format: str
+    bits: int
+    width_px: int
+    height_px: int
+
+    @property
+    def text(self) -> str:
+        """As a person chooses it: `Y16 1920x1200`."""
+        return f"{self.pixel_format} {self.width_px}x{self.height_px}"
+
+
+@dataclass(frozen=True)
 class CameraChoice:
-    """A camera and what it would be asked for: its deepest grey format at its largest size."""
+    """A camera and what it would be asked for: its deepest grey format at its largest size, the first of all."""
 
     kind: Literal["v4l2", "simulated"]
     device: str
@@ -22,6 +37,7 @@ class CameraChoice:
     width_px: int
     height_px: int
     error: str = ""
+    formats: tuple[FormatChoice, ...] = ()
 
 
 SIMULATED = CameraChoice("simulated", "", "Simulated camera in the packaged room", "", 12, 384, 288)
@@ -34,14 +50,27 @@ def found_cameras(folder: Path = Path("/dev")) -> Sequence[CameraChoice]:
 
 def _choice(found: DeviceDescription) -> CameraChoice:
     depths = {one.code: one.bits for one in FORMATS}
-    offered = [
-        (depths[one.code], size.width_px * size.height_px, one.code, size)
+    offered = {
+        FormatChoice(one.code, depths[one.code], size.width_px, size.height_px)
         for one in found.formats
         for size in one.sizes
         if one.code in depths
-    ]
+    }
+    device = str(found.path)
     if not offered:
         reason = found.error or "It has no format that airlens reads. Choose another camera."
-        return CameraChoice("v4l2", str(found.path), found.name, "", 0, 0, 0, reason)
-    bits, _, code, size = max(offered, key=lambda one: one[:2])
-    return CameraChoice("v4l2", str(found.path), found.name, code, bits, size.width_px, size.height_px)
+        return CameraChoice("v4l2", device, found.name, "", 0, 0, 0, reason)
+    ordered = sorted(
+        offered, key=lambda one: (one.bits, one.width_px * one.height_px, one.text), reverse=True
+    )
+    best = ordered[0]
+    return CameraChoice(
+        "v4l2",
+        device,
+        found.name,
+        best.pixel_format,
+        best.bits,
+        best.width_px,
+        best.height_px,
+        formats=tuple(ordered),
+    )

@@ -119,9 +119,11 @@ def _fill(folder: Path, answers: Answers, text: str) -> None:
 
 def truth_file(answers: Answers) -> Path | None:
     """The room that a simulated camera looks at."""
-    named = answers.camera.truth
-    if not named:
-        return None
+    return room_of(answers.camera.truth) if answers.camera.truth else None
+
+
+def room_of(named: str) -> Path:
+    """The file of a room that `truth` names."""
     return SAMPLE_ROOM if named == SAMPLE else Path(named)
 
 

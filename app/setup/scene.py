@@ -85,6 +85,15 @@ def picture_on_wall_m(optics: Optics, room: Box) -> tuple[float, float]:
     ]
 
 
+def picture_told(scene: Scene) -> str:
+    """How much of the patterned wall the camera sees, as a sentence."""
+    width_m, height_m = picture_on_wall_m(scene.views[0].camera, scene.room)
+    return (
+        f"the camera sees {width_m:.2f} x {height_m:.2f} m of a wall of "
+        f"{scene.room.size_m[0]:g} x {scene.room.size_m[2]:g} m."
+    )
+
+
 def _optics(camera: CameraAnswer, room: Box) -> Optics:
     """Straight at the patterned wall; from its middle where only the distance is told."""
     back_m = room.upper_m[1]

@@ -62,6 +62,12 @@ def to_si(text: Any, kind: str) -> float:
     return factor * number + offset
 
 
+def unit_of(text: str) -> str:
+    """The unit behind the number; empty where there is none."""
+    written = _WRITTEN.fullmatch(text)
+    return "" if written is None else (written[2] or "").replace("°", "")
+
+
 def _looks_like_kelvin(text: str) -> bool:
     """Whether a temperature in C has the number that a room has in kelvin."""
     written = _WRITTEN.fullmatch(text)

@@ -16,6 +16,15 @@ class TemplateResource(Strict):
     answers: dict[str, Any]
 
 
+class FoundFormat(Strict):
+    """A format of a camera, at one size."""
+
+    pixel_format: str
+    bits: int
+    width_px: int
+    height_px: int
+
+
 class FoundCamera(Strict):
     """A camera to choose, with what it would be asked for; `error` says why it cannot be used."""
 
@@ -27,6 +36,7 @@ class FoundCamera(Strict):
     width_px: int
     height_px: int
     error: str = ""
+    formats: list[FoundFormat] = Field(default_factory=list)
 
 
 class SentAnswers(Strict):

@@ -191,7 +191,7 @@ def test_a_folder_that_holds_something_is_left_alone(tmp_path):
 
 def test_without_answers_the_way_to_them_is_said(tmp_path):
     with pytest.raises(BadInputError, match="airlens new --template wall-jet"):
-        run("new", tmp_path / "lab")
+        run("new", tmp_path / "lab", text="")
     with pytest.raises(BadInputError, match="radiator"):
         run("new", "--template", "cellar")
 
@@ -209,7 +209,7 @@ def test_from_a_pipe_of_answers_to_a_volume(tmp_path):
     outlet_k = float(truth.temperature_k[0][18:30, 3:10].mean())
     text = ANSWERS.replace("TRUTH", str(SAMPLE_ROOM)).replace("OUTLET", f"{outlet_k:.2f}")
     said = run("new", tmp_path / "lab", "--from", "-", text=text)
-    assert "Next: airlens preview" in said
+    assert "Next: airlens plan" in said
     run("preview", tmp_path / "lab")
     for role in ("reference", "flow"):
         run("capture", role, tmp_path / "lab", "--frames", 20)

@@ -1,0 +1,1 @@
+"""An experiment by questions and answers."""

@@ -1,0 +1,298 @@
+"""`airlens new EXPERIMENT` asks: from a pipe, at a terminal, interrupted, gone back, and with wrong answers."""
+
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from app.errors import BadInputError
+from app.files.toml import toml_data
+from app.interview.conversation import DRAFT_FILE, Piped
+from app.interview.questions import Inventory
+from app.interview.talk import talk
+from app.rig.inventory import SIMULATED, CameraChoice, FormatChoice
+from app.rig.ports import FoundPort, who_is_there
+from app.setup.experiment import SAMPLE, template
+from drivers.clock import SystemClock
+from drivers.simulated.projector.hosts import PtyHost
+from tests.drivers.projector.twins import make_twin
+
+AIRLENS = [sys.executable, "-c", "from app.cli import main; main()", "new"]
+FORMATS = (FormatChoice("Y16", 16, 1920, 1200), FormatChoice("GREY", 8, 640, 480))
+CAMERA = CameraChoice("v4l2", "/dev/video7", "A camera", "Y16", 16, 1920, 1200, formats=FORMATS)
+DEAD = CameraChoice("v4l2", "/dev/video8", "Another", "", 0, 0, 0, "It is in use.")
+# A jet as a tape measure gives it; an empty line takes the default that is shown.
+JET = """\
+# Devices
+/dev/video7
+Y16 1920x1200
+wall-jet
+12
+# Room
+A lab
+4 m
+3
+270 cm
+20 C
+1
+x_min
+1.2
+1.8
+2.3
+2.5
+180 m3/h
+5 %
+26
+0.3
+1
+x_max
+1.2
+1.8
+0.1
+0.3
+none
+0
+0
+1
+2
+1.5
+1.1
+22.4
+0.3
+0
+# Wall
+print
+# Place
+59 deg
+1920
+1200
+4 m
+20 ms
+50
+"""
+
+
+def inventory(**other) -> Inventory:
+    return Inventory(
+        **{"cameras": (CAMERA, DEAD, SIMULATED), "ports": (), "who": lambda device: None} | other
+    )
+
+
+class Script(Piped):
+    """Answers from a text; keeps what it was told and refused, as a person at a terminal would see it."""
+
+    def __init__(self, text: str, patient: bool = False) -> None:
+        self.lines = text.splitlines(keepends=True)
+        super().__init__(lambda: self.lines.pop(0) if self.lines else "")
+        self.patient, self.told, self.refused = patient, [], []
+
+    def say(self, text):
+        self.told.append(text)
+
+    def refuse(self, question, reason):
+        self.refused.append(reason)
+        if not self.patient:
+            super().refuse(question, reason)
+
+
+def answered(folder: Path, text: str, **other):
+    script = Script(text, patient=True)
+    talk(folder, script, lambda: inventory(**other))
+    return toml_data((folder / "answers.toml").read_text(), "answers"), script
+
+
+def changed(old: str, new: str, text: str = JET) -> str:
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+def test_what_is_answered_is_what_a_file_of_answers_holds(tmp_path):
+    answers, script = answered(tmp_path / "lab", JET)
+    assert answers["room"] == ["4 m", "3 m", "270 cm"]
+    camera = answers["camera"]
+    assert (camera["device"], camera["bits"], camera["width_px"]) == ("/dev/video7", 12, 1920)
+    assert (camera["angle_of_view"], camera["frames"]) == ("59 deg", 50)
+    assert "focal_length" not in camera
+    (supply,) = answers["supply"]
+    assert (supply["flow"], supply["lower"], supply["upper"]) == (
+        "180 m3/h",
+        ["1.2 m", "2.3 m"],
+        ["1.8 m", "2.5 m"],
+    )
+    assert "temperature" not in answers["outlet"][0]
+    assert script.refused == []
+    assert any("the camera sees 4.53 x 2.83 m of a wall of 4 x 2.7 m" in told for told in script.told)
+    assert any("It is in use." in told for told in script.told)
+    assert {path.name for path in (tmp_path / "lab").iterdir()} == {
+        "answers.toml",
+        "boundary",
+        "experiment.toml",
+    }
+
+
+WRONG = [
+    ("\n3\n270 cm", "\n3000 m\n3\n270 cm", "millimetres"),
+    ("\n20 C", "\n293 C\n20 C", "looks like kelvin"),
+    ("/dev/video7", "/dev/video8\n/dev/video7", "none of them"),
+    ("180 m3/h", "180 m3\n180 m3/h", "no unit of volume flow"),
+    ("\n2.5\n", "\n2.9\n2.5\n", "is not on x_min"),
+    ("\n1\nx_min", "\ntwo\n1\nx_min", "no whole number"),
+    ("0.3\n1\nx_max", "0.3\n0\n1\nx_max", "must leave"),
+    ("59 deg", "400 deg\n59 deg", "1 to 170 degrees"),
+    ("\n1.5\n1.1", "\n15\n1.5\n1.1", "outside the room"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "sentence"), WRONG)
+def test_a_wrong_answer_is_told_at_once_and_asked_again(old, new, sentence, tmp_path):
+    answers, script = answered(tmp_path / "lab", changed(old, new))
+    assert len(script.refused) == 1
+    assert sentence in script.refused[0]
+    right, _ = answered(tmp_path / "other", JET)
+    assert answers == right
+    with pytest.raises(BadInputError, match=f"standard input, line .*{sentence}"):
+        talk(tmp_path / "piped", Piped(iter(changed(old, new).splitlines(keepends=True)).__next__), inventory)
+    assert not (tmp_path / "piped" / "experiment.toml").exists()
+
+
+def test_an_outlet_on_a_supply_is_asked_for_again_as_a_whole(tmp_path):
+    on_it = "x_min\n1.2\n1.8\n2.4\n2.6\nnone\n"
+    answers, script = answered(tmp_path / "lab", changed("x_max\n", f"{on_it}x_max\n"))
+    assert len(script.refused) == 1
+    assert "overlaps supply 1 on x_min" in script.refused[0]
+    assert answers["outlet"][0]["wall"] == "x_max"
+
+
+def test_back_asks_the_question_before_again(tmp_path):
+    answers, _ = answered(tmp_path / "lab", changed("A lab\n4 m\n3\n", "A lab\n4 m\nback\n5 m\n3 m\n"))
+    assert answers["room"][:2] == ["5 m", "3 m"]
+
+
+def test_an_interrupted_conversation_goes_on_where_it_was_and_can_be_begun_anew(tmp_path):
+    folder, lines = tmp_path / "lab", JET.splitlines(keepends=True)
+    with pytest.raises(EOFError, match="supply 1: temperature"):
+        talk(folder, Script("".join(lines[:20])), inventory)
+    assert [path.name for path in folder.iterdir()] == [DRAFT_FILE]
+    with pytest.raises(BadInputError, match="neither; expected 'go on' or 'begin anew'"):
+        talk(folder, Script(JET), inventory)
+    talk(folder, Script("go on\n" + "".join(lines[20:])), inventory)
+    whole, _ = answered(tmp_path / "whole", JET)
+    assert toml_data((folder / "answers.toml").read_text(), "answers") == whole
+    again = tmp_path / "again"
+    with pytest.raises(EOFError):
+        talk(again, Script("".join(lines[:20])), inventory)
+    # The draft is itself a pipe of answers.
+    kept = (again / DRAFT_FILE).read_text()
+    talk(again, Script("begin anew\n" + kept + "".join(lines[20:])), inventory)
+    assert toml_data((again / "answers.toml").read_text(), "answers") == whole
+
+
+def test_a_camera_that_is_gone_when_the_conversation_goes_on_is_asked_for_again(tmp_path):
+    folder = tmp_path / "lab"
+    with pytest.raises(EOFError):
+        talk(folder, Script("".join(JET.splitlines(keepends=True)[:12])), inventory)
+    with pytest.raises(EOFError, match="The room that it looks at"):
+        talk(folder, Script("go on\nsimulated\n"), lambda: inventory(cameras=(SIMULATED,)))
+
+
+def test_a_projectors_port_is_asked_who_is_there(tmp_path):
+    twin = make_twin("benq", clock=SystemClock())
+    with PtyHost(twin, tmp_path / "port") as host:
+        device = str(host.path)
+        thrown = f"projector\n3 m\n-1 m\n1.3 m\n40 deg\n1920\n1200\n{device}\n\n"
+        answers, script = answered(
+            tmp_path / "lab",
+            changed("print\n", thrown),
+            ports=(FoundPort(device, "a port"),),
+            who=who_is_there,
+        )
+    assert answers["projector"]["url"] == f"benq:{device}"
+    assert any(device in told and "standby" in told for told in script.told)
+
+
+def test_a_real_pipe_makes_the_experiment_and_a_wrong_line_says_its_number(tmp_path):
+    done = subprocess.run(
+        [*AIRLENS, "lab"],
+        input="simulated\n" + 100 * "\n",
+        text=True,
+        capture_output=True,
+        cwd=tmp_path,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "the camera sees 5.41 x 4.06 m" in done.stdout
+    assert "Next: airlens plan lab" in done.stdout
+    made = toml_data((tmp_path / "lab" / "answers.toml").read_text(), "answers")
+    packaged = toml_data(template(SAMPLE), SAMPLE)
+    assert {key: made[key] for key in ("room", "air", "camera")} == {
+        k: packaged[k] for k in ("room", "air", "camera")
+    }
+    wrong = subprocess.run(
+        [*AIRLENS, "other"],
+        input="simulated\nsample\n\n4 ells\n",
+        text=True,
+        capture_output=True,
+        cwd=tmp_path,
+        check=False,
+    )
+    assert wrong.returncode == 2
+    assert "line 4, the answer to 'Length along x': 'ells' is no unit of length" in wrong.stderr
+
+
+def test_a_pipe_as_a_file_is_read(tmp_path):
+    (tmp_path / "answers.toml").write_text(template(SAMPLE))
+    command = f"{' '.join(map(repr, AIRLENS[:1]))} -c {AIRLENS[2]!r} new lab --from <(cat answers.toml)"
+    done = subprocess.run(["bash", "-c", command], text=True, capture_output=True, cwd=tmp_path, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "lab" / "experiment.toml").is_file()
+
+
+class Screen:
+    """What a terminal shows, and hands that type."""
+
+    def __init__(self, folder: Path, *words: str) -> None:
+        self.master, slave = pty.openpty()
+        self.process = subprocess.Popen(
+            [*AIRLENS, *words], stdin=slave, stdout=slave, stderr=slave, cwd=folder
+        )
+        os.close(slave)
+        self.shown = ""
+
+    def await_text(self, text: str) -> None:
+        until_s = time.monotonic() + 100
+        while text not in self.shown and time.monotonic() < until_s:
+            if select.select([self.master], [], [], 0.2)[0]:
+                self.shown += os.read(self.master, 4096).decode()
+        assert text in self.shown
+
+    def type(self, line: str, until: str) -> None:
+        self.shown = ""
+        os.write(self.master, f"{line}\n".encode())
+        self.await_text(until)
+
+
+def test_at_a_terminal_questions_show_their_options_and_defaults_and_ctrl_c_keeps_the_answers(tmp_path):
+    screen = Screen(tmp_path, "lab")
+    screen.await_text("simulated  Simulated camera in the packaged room")
+    screen.await_text("Camera [")
+    screen.type("simulated", "The room that it looks at (an NPZ file, or sample) [sample]: ")
+    screen.type("", "Name of the experiment [The packaged room]: ")
+    screen.type("", "Length along x [4.1 m]: ")
+    screen.type("4100 m", "millimetres")
+    screen.type("4.1", "Depth along y [3 m]: ")
+    screen.process.send_signal(signal.SIGINT)
+    screen.await_text("goes on there")
+    assert screen.process.wait(60) == 130
+    os.close(screen.master)
+    screen = Screen(tmp_path, "lab")
+    screen.await_text("4 answers are kept; go on or begin anew [go on]: ")
+    screen.type("", "Depth along y [3 m]: ")
+    screen.process.kill()
+    screen.process.wait()
+    os.close(screen.master)
