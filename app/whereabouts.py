@@ -17,7 +17,7 @@ from app.experiment.folder import (
 )
 from app.experiment.plan import PLAN_FILE
 from app.experiment.printed import is_of_the_scene, read_printed
-from app.experiment.rig_settings import V4l2CameraSettings
+from app.experiment.rig_settings import RealCameraSettings
 from core.scene import FixedTexture
 
 
@@ -83,7 +83,7 @@ def _of_the_rig(experiment: Experiment, shown: str) -> Next | None:
 def _of_the_print(experiment: Experiment, shown: str) -> Next | None:
     """What must hang on the wall, or be held before the camera, of a rig that is no simulation."""
     rig = experiment.settings.rig
-    if not isinstance(rig.camera, V4l2CameraSettings) or finished(experiment.captures_folder):
+    if not isinstance(rig.camera, RealCameraSettings) or finished(experiment.captures_folder):
         return None
     if isinstance(experiment.settings.scene.light, FixedTexture):
         printed = read_printed(experiment, "pattern")
@@ -145,7 +145,7 @@ def _roles(experiment: Experiment) -> Counter[str]:
 def _rig(experiment: Experiment) -> str:
     rig, scene = experiment.settings.rig, experiment.settings.scene
     camera = "no camera named" if rig.camera is None else f"{rig.camera_kind} camera"
-    if isinstance(rig.camera, V4l2CameraSettings):
+    if isinstance(rig.camera, RealCameraSettings):
         camera = f"camera {rig.camera.device}"
     light = "a printed pattern" if isinstance(scene.light, FixedTexture) else "a projector"
     return f"{camera} before {light}; a room of {' x '.join(f'{size:g}' for size in scene.room.size_m)} m"

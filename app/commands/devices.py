@@ -17,15 +17,17 @@ def devices(
     full: Annotated[bool, typer.Option("--full", help="List sizes, rates and controls too.")] = False,
 ) -> None:
     """List cameras with their formats and controls, serial ports, and screens."""
-    from serial.tools import list_ports
-
+    from app.rig.ports import found_ports
+    from drivers.aravis import list_aravis
     from drivers.v4l2 import list_devices
 
-    cameras = list_devices()
-    ports = [{"device": port.device, "description": port.description} for port in list_ports.comports()]
+    cameras, vision = list_devices(), list_aravis()
+    ports = [asdict(port) for port in found_ports()]
     if as_json:
         found: list[dict[str, Any]] = [asdict(camera) for camera in cameras]
-        typer.echo(json.dumps({"cameras": found, "serial_ports": ports}, default=str))
+        networked = [asdict(camera) for camera in vision]
+        content = {"cameras": found, "vision_cameras": networked, "serial_ports": ports}
+        typer.echo(json.dumps(content, default=str))
         return
     for camera in cameras:
         typer.echo(f"{camera.path}  {camera.name}" + (f"  {camera.error}" if camera.error else ""))
@@ -35,9 +37,13 @@ def devices(
             typer.echo(f"    {item.code:<5}{item.description:<24}{shown}")
         for control in camera.controls if full else ():
             typer.echo(f"    {control.name} {control.minimum}..{control.maximum} ({control.kind})")
+    for one in vision:
+        typer.echo(f"{one.device}  {one.name}  {one.address}  {one.error}".rstrip())
+        for name in one.formats:
+            typer.echo(f"    {name:<8}{one.width_px}x{one.height_px}")
     for port in ports:
         typer.echo(f"{port['device']}  serial port  {port['description']}")
-    if not cameras and not ports:
+    if not cameras and not vision and not ports:
         typer.echo(
             "No camera and no serial port was found. Plug one in; on Linux a camera is /dev/video*. "
             "A simulated rig needs none: airlens demo."

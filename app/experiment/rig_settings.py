@@ -89,7 +89,37 @@ class V4l2CameraSettings(Strict):
     """Whether automatic exposure, gain, white balance and focus are switched off."""
 
 
-CameraSettings = Annotated[SimulatedCameraSettings | V4l2CameraSettings, Field(discriminator="kind")]
+class AravisCameraSettings(Strict):
+    """A GigE Vision or USB3 Vision camera, where the system's library Aravis is installed.
+
+    `frame_rate_hz` is the camera's own unless given; automatic exposure and gain are switched off unless
+    `automatics_off` is false.
+    """
+
+    kind: Literal["aravis"]
+    """A GigE Vision or USB3 Vision camera."""
+    device: str
+    """Its id, as `airlens devices` lists it, or its address on the network."""
+    pixel_format: str = "Mono8"
+    """Grey format, as the standard names it."""
+    width_px: Annotated[int, Field(gt=0)]
+    """Columns."""
+    height_px: Annotated[int, Field(gt=0)]
+    """Rows."""
+    bits: Annotated[int, Field(ge=1, le=16)] = 8
+    """Digits of a count."""
+    exposure_s: Annotated[float, Field(gt=0, le=60)]
+    """Exposure of a frame."""
+    gain: float | None = None
+    """In the camera's own unit; its own unless given."""
+    frame_rate_hz: Annotated[float | None, Field(gt=0, le=10_000)] = None
+    """Frames a second; the camera's own unless given."""
+    automatics_off: bool = True
+    """Whether automatic exposure and gain are switched off."""
+
+
+RealCameraSettings = V4l2CameraSettings | AravisCameraSettings
+CameraSettings = Annotated[SimulatedCameraSettings | RealCameraSettings, Field(discriminator="kind")]
 
 
 class BoardSettings(Strict):
@@ -144,6 +174,6 @@ class RigSettings(Strict):
     @property
     def addresses(self) -> tuple[str, ...]:
         """The device files and hosts that this rig opens; simulated twins open none."""
-        camera = (self.camera.device,) if isinstance(self.camera, V4l2CameraSettings) else ()
+        camera = (self.camera.device,) if isinstance(self.camera, RealCameraSettings) else ()
         named = () if self.projector is None else (self.projector.url,)
         return camera + tuple(url for url in named if not url.startswith("simulated:"))

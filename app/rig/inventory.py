@@ -1,13 +1,17 @@
 """The cameras that a new experiment may choose from: what is plugged in, and one that computes its pictures."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from drivers.aravis import AravisDescription, list_aravis
+from drivers.aravis.camera import FORMATS as ARAVIS_FORMATS
 from drivers.v4l2 import list_devices
 from drivers.v4l2.formats import FORMATS
 from drivers.v4l2.inventory import DeviceDescription
+
+CameraKind = Literal["v4l2", "aravis", "simulated"]
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,7 @@ class FormatChoice:
 class CameraChoice:
     """A camera and what it would be asked for: its deepest grey format at its largest size, the first of all."""
 
-    kind: Literal["v4l2", "simulated"]
+    kind: CameraKind
     device: str
     name: str
     pixel_format: str
@@ -44,11 +48,11 @@ SIMULATED = CameraChoice("simulated", "", "Simulated camera in the packaged room
 
 
 def found_cameras(folder: Path = Path("/dev")) -> Sequence[CameraChoice]:
-    """Every camera of the kernel, then the simulated one."""
-    return [*map(_choice, list_devices(folder)), SIMULATED]
+    """Every camera of the kernel, of the network and of USB3 Vision, then the simulated one."""
+    return [*map(_v4l2, list_devices(folder)), *map(_aravis, list_aravis()), SIMULATED]
 
 
-def _choice(found: DeviceDescription) -> CameraChoice:
+def _v4l2(found: DeviceDescription) -> CameraChoice:
     depths = {one.code: one.bits for one in FORMATS}
     offered = {
         FormatChoice(one.code, depths[one.code], size.width_px, size.height_px)
@@ -56,18 +60,31 @@ def _choice(found: DeviceDescription) -> CameraChoice:
         for size in one.sizes
         if one.code in depths
     }
-    device = str(found.path)
+    return _choice("v4l2", str(found.path), found.name, offered, found.error)
+
+
+def _aravis(found: AravisDescription) -> CameraChoice:
+    offered = {
+        FormatChoice(name, ARAVIS_FORMATS[name], found.width_px, found.height_px) for name in found.formats
+    }
+    name = f"{found.name} ({found.address})" if found.address else found.name
+    return _choice("aravis", found.device, name, offered, found.error)
+
+
+def _choice(
+    kind: CameraKind, device: str, name: str, offered: Collection[FormatChoice], error: str
+) -> CameraChoice:
     if not offered:
-        reason = found.error or "It has no format that airlens reads. Choose another camera."
-        return CameraChoice("v4l2", device, found.name, "", 0, 0, 0, reason)
+        reason = error or "It has no format that airlens reads. Choose another camera."
+        return CameraChoice(kind, device, name, "", 0, 0, 0, reason)
     ordered = sorted(
         offered, key=lambda one: (one.bits, one.width_px * one.height_px, one.text), reverse=True
     )
     best = ordered[0]
     return CameraChoice(
-        "v4l2",
+        kind,
         device,
-        found.name,
+        name,
         best.pixel_format,
         best.bits,
         best.width_px,

@@ -9,7 +9,8 @@ from jaxtyping import Float32
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
 from app.experiment.rig_settings import CameraSettings, SimulatedCameraSettings
-from app.rig.cameras import open_v4l2
+from app.rig.cameras import open_real
+from app.rig.inventory import found_cameras
 from app.rig.practice_room import PracticeRoom
 from app.rig.projectors import open_real_projector
 from app.rig.rendered import AirState, seen_picture
@@ -24,7 +25,6 @@ from drivers.projector.protocol import Projector
 from drivers.protocols import Camera
 from drivers.simulated import SensorNoise, SimulatedCamera, SimulatedDisplay
 from drivers.simulated.projector.open import TWINS, open_twin
-from drivers.v4l2 import list_devices
 
 # A lamp that warms up for longer than an hour is a slip.
 LONGEST_S = 3600.0
@@ -39,7 +39,7 @@ def open_camera(experiment: Experiment, air: AirState, view: int = 0, moment: in
     if isinstance(settings, SimulatedCameraSettings):
         steps = int(air == "moving") if moment is None else moment
         return _simulated_camera(experiment, settings, air, view, steps)
-    return open_v4l2(settings)
+    return open_real(settings)
 
 
 def named_camera(experiment: Experiment) -> CameraSettings:
@@ -47,7 +47,7 @@ def named_camera(experiment: Experiment) -> CameraSettings:
     settings = experiment.settings.rig.camera
     if settings is not None:
         return settings
-    found = ", ".join(f"{device.path} ({device.name})" for device in list_devices()) or "none"
+    found = ", ".join(f"{one.device} ({one.name})" for one in found_cameras() if one.device) or "none"
     raise BadInputError(
         f"The rig of {experiment.folder.name} names no camera. Cameras found on this machine: {found}. Add to its "
         'experiment.toml: [rig.camera] with kind = "v4l2", device, width_px, height_px and exposure_s; '
@@ -94,7 +94,7 @@ def open_stage(
     settings, scene = named_camera(experiment), experiment.settings.scene
     if isinstance(settings, SimulatedCameraSettings):
         return PracticeStage(scene, settings, board, view)
-    return RealStage(open_v4l2(settings), display, panel_of(scene))
+    return RealStage(open_real(settings), display, panel_of(scene))
 
 
 def panel_of(scene: Scene) -> tuple[int, int] | None:

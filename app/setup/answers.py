@@ -26,12 +26,12 @@ class CameraAnswer(Strict):
     packaged room, `sample`.
     """
 
-    kind: Literal["v4l2", "simulated"]
-    """A camera of the kernel, or one that computes its pictures."""
+    kind: Literal["v4l2", "aravis", "simulated"]
+    """A camera of the kernel, one of GigE Vision or USB3 Vision, or one that computes its pictures."""
     device: str = "/dev/video0"
-    """Its device file; `airlens devices` lists them."""
+    """Its device file, id or address; `airlens devices` lists them."""
     pixel_format: str = "Y16"
-    """Raw or grey format, as the kernel names it."""
+    """Raw or grey format, as the camera names it."""
     bits: Annotated[int, Field(ge=1, le=16)] = 12
     """Digits of a count."""
     width_px: Pixels

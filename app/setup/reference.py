@@ -67,6 +67,16 @@ diffusivity_m2_s = 1e-3
 [scene.air]
 gladstone_dale = 2.26e-4
 """
+_VISION = """
+[rig.camera]
+kind = "aravis"
+device = "192.168.0.30"
+pixel_format = "Mono12"
+width_px = 1920
+height_px = 1200
+bits = 12
+exposure_s = 0.02
+"""
 _MORE_ANSWERS = """
 pattern_seed = 7
 [camera]
@@ -363,7 +373,7 @@ def _collect(kind: Any, data: Any, found: dict[tuple[Any, str], Any]) -> None:
 
 def _experiments() -> list[Any]:
     made = [to_plain(settings_of(from_toml(template(n), Answers, n))) for n in TEMPLATES]
-    return [*made, tomllib.loads(_MORE)]
+    return [*made, tomllib.loads(_MORE), tomllib.loads(_VISION)]
 
 
 def _answers() -> list[Any]:

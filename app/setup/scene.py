@@ -5,6 +5,7 @@ import math
 from app.errors import BadInputError
 from app.experiment.folder import ExperimentSettings
 from app.experiment.rig_settings import (
+    AravisCameraSettings,
     ProjectorSettings,
     RigSettings,
     SimulatedCameraSettings,
@@ -137,14 +138,17 @@ def _rig(answers: Answers) -> RigSettings:
     if camera.kind == "simulated":
         device = SimulatedCameraSettings(room=TRUTH_FILE, exposure_s=camera.exposure)
     else:
-        device = V4l2CameraSettings(
-            kind="v4l2",
-            device=camera.device,
-            pixel_format=camera.pixel_format,
-            width_px=camera.width_px,
-            height_px=camera.height_px,
-            bits=camera.bits,
-            exposure_s=camera.exposure,
+        told = {
+            "kind": camera.kind,
+            "device": camera.device,
+            "pixel_format": camera.pixel_format,
+            "width_px": camera.width_px,
+            "height_px": camera.height_px,
+            "bits": camera.bits,
+            "exposure_s": camera.exposure,
+        }
+        device = (AravisCameraSettings if camera.kind == "aravis" else V4l2CameraSettings).model_validate(
+            told
         )
     spoken = ProjectorSettings(url=projector.url) if projector and projector.url else None
     return RigSettings(camera=device, projector=spoken)

@@ -1,4 +1,4 @@
-"""What every camera owes its user, checked on the twin and, with `--camera /dev/video0`, on hardware."""
+"""What every camera owes its user: the twin, Aravis's fake where it is installed, `--camera /dev/video0`."""
 
 from pathlib import Path
 
@@ -10,6 +10,8 @@ from drivers.capture import run_capture
 from drivers.protocols import Camera
 from drivers.simulated import SimulatedCamera
 from drivers.v4l2 import V4l2Camera, V4l2Request, list_devices
+from tests.drivers.aravis.fake import fake_camera, missing
+from tests.drivers.aravis.fake import opened as opened_fake
 from tests.drivers.scenes import pattern
 
 
@@ -21,8 +23,18 @@ def open_hardware(device):
     return V4l2Camera(V4l2Request(device, size.width_px, size.height_px, pixel_format=chosen.code))
 
 
-@pytest.fixture(params=["twin", pytest.param("hardware", marks=pytest.mark.hardware)])
+@pytest.fixture(
+    params=[
+        "twin",
+        pytest.param("aravis", marks=missing),
+        pytest.param("hardware", marks=pytest.mark.hardware),
+    ]
+)
 def camera(request):
+    if request.param == "aravis":
+        with fake_camera(), opened_fake() as opened:
+            yield opened
+        return
     if request.param == "twin":
         view = pattern()
         opened = SimulatedCamera(lambda: view, seed=1)

@@ -28,7 +28,7 @@ class FoundFormat(Strict):
 class FoundCamera(Strict):
     """A camera to choose, with what it would be asked for; `error` says why it cannot be used."""
 
-    kind: Literal["v4l2", "simulated"]
+    kind: Literal["v4l2", "aravis", "simulated"]
     device: str
     name: str
     pixel_format: str
