@@ -10,7 +10,7 @@ from app.experiment.folder import Experiment
 from app.experiment.rig_settings import SimulatedCameraSettings
 from app.rig.nuisances import spoiled
 from app.volume.file import RoomVolume, read_volume
-from app.volume.scene import room_objects
+from app.volume.scene import room_box, room_objects
 from core.fields import GridField
 from core.geometry import Box, crop, rotation_matrix, rotation_vector
 from core.plan.print_choice import suited_print
@@ -33,11 +33,19 @@ def seen_picture(
     experiment: Experiment, settings: SimulatedCameraSettings, air: AirState, view: int, steps: int
 ) -> Picture:
     """The luminance of every pixel after so many steps of the mount; 1 fills the well. Raises BadInputError."""
-    scene = experiment.settings.scene
+    scene = _as_it_is(experiment, settings)
     for step in range(steps):
         scene = drifted(scene, view, settings.drift_px, settings.world.breathing_px, settings.seed + step)
     picture = _rendered(experiment, settings, scene, air, view)
     return spoiled(picture, settings.world, steps, settings.seed)
+
+
+def _as_it_is(experiment: Experiment, settings: SimulatedCameraSettings) -> Scene:
+    """The scene with the simulated room's own walls: what was stated of them may be wrong by a centimetre."""
+    scene, path = experiment.settings.scene, experiment.folder / settings.room
+    return (
+        replace(scene, room=room_box(read_volume(path)), boundary=(), objects=()) if path.is_file() else scene
+    )
 
 
 def _rendered(
