@@ -16,7 +16,14 @@ from jaxtyping import Float
 from pydantic import TypeAdapter
 
 from app.api.models.about import About, Health
-from app.api.models.answers import AnswersResource, CheckResource, FoundCamera, TemplateResource
+from app.api.models.answers import (
+    AnswersResource,
+    CheckResource,
+    FoundCamera,
+    FoundPort,
+    PortAnswer,
+    TemplateResource,
+)
 from app.api.models.calibrations import CalibrationResource
 from app.api.models.captures import CaptureResource, DeskResource, Role
 from app.api.models.devices import CameraResource
@@ -24,6 +31,7 @@ from app.api.models.events import EventResource
 from app.api.models.experiments import ExperimentLine, ExperimentResource
 from app.api.models.guide import GuideResource, StepText
 from app.api.models.jobs import Curves, JobResource
+from app.api.models.prints import PrintedResource
 from app.api.models.problem import MEDIA_TYPE, Problem
 from app.api.models.projector import ProjectorResource, WireLine
 from app.api.models.results import ComparisonResource, Form, PresetResource, ResultLine, ResultResource
@@ -191,6 +199,25 @@ class Client:
         """List the cameras that a new experiment may choose from."""
         return self._ask(list[FoundCamera], "GET", "/devices/found")
 
+    def found_picture(self, camera: FoundCamera) -> bytes:
+        """Return one JPEG of a camera that was found."""
+        query = {
+            "kind": camera.kind,
+            "device": camera.device,
+            "pixel_format": camera.pixel_format,
+            "width_px": str(camera.width_px),
+            "height_px": str(camera.height_px),
+        }
+        return self._bytes("/devices/found/picture", query).content
+
+    def ports(self) -> list[FoundPort]:
+        """List the serial ports."""
+        return self._ask(list[FoundPort], "GET", "/devices/ports")
+
+    def ask_port(self, device: str) -> PortAnswer:
+        """Ask a serial port which projector is there; takes some seconds."""
+        return self._ask(PortAnswer, "POST", "/devices/ports/ask", {"device": device})
+
     def templates(self) -> list[TemplateResource]:
         """List filled-in answers to start from."""
         return self._ask(list[TemplateResource], "GET", "/answers/templates")
@@ -271,6 +298,43 @@ class Client:
         """Begin a capture; `settings` are those of NewCapture."""
         body = {"role": role, "frames": frames, **settings}
         return self._ask(DeskResource, "POST", f"/experiments/{experiment}/captures", body)
+
+    def import_captures(
+        self,
+        experiment: str,
+        pictures: Mapping[Role, Sequence[str]],
+        bits: int | None = None,
+        ambient_temperature_k: float | None = None,
+    ) -> list[CaptureResource]:
+        """Make captures of uploaded pictures: the ids of the uploads for each role."""
+        roles = [{"role": role, "uploads": list(uploads)} for role, uploads in pictures.items()]
+        body = {"pictures": roles, "bits": bits, "ambient_temperature_k": ambient_temperature_k}
+        path = f"/experiments/{experiment}/captures/imported"
+        return self._ask(list[CaptureResource], "POST", path, body)
+
+    def prints(self, experiment: str) -> list[PrintedResource]:
+        """List what was printed."""
+        return self._ask(list[PrintedResource], "GET", f"/experiments/{experiment}/prints")
+
+    def print_pattern(
+        self, experiment: str, paper: str = "a3", overlap_m: float = 0.01, choose: bool = False
+    ) -> PrintedResource:
+        """Make the PDF of the wall's pattern."""
+        body = {"paper": paper, "overlap_m": overlap_m, "choose": choose}
+        return self._ask(PrintedResource, "POST", f"/experiments/{experiment}/prints/pattern", body)
+
+    def print_board(
+        self, experiment: str, paper: str = "a3", board: Mapping[str, Any] | None = None
+    ) -> PrintedResource:
+        """Make the PDF of a board to calibrate with: the fields of BoardGeometry, or the rig's own."""
+        body = {"paper": paper, "board": board}
+        return self._ask(PrintedResource, "POST", f"/experiments/{experiment}/prints/board", body)
+
+    def read_print(self, experiment: str, what: Literal["pattern", "board"], file: Path) -> Path:
+        """Write the PDF that was made last."""
+        content = self._bytes(f"/experiments/{experiment}/prints/{what}/pdf").content
+        write_durably(file, lambda temporary: temporary.write_bytes(content))
+        return file
 
     def running_capture(self) -> DeskResource:
         """Return the capture that is being taken, or the last one."""

@@ -150,6 +150,8 @@ def _read(file: Path) -> Iterator[Pixels]:
     with reading(file, "It may be truncated: export it again."):
         if file.suffix.lower() in RAW_SUFFIXES:
             yield _read_raw(file)
+        elif file.suffix == ".npy":
+            yield _counts(file, np.load(file, allow_pickle=False))
         elif file.suffix.lower() in (".tif", ".tiff"):
             yield from _read_tiff(file)
         else:

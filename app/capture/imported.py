@@ -1,6 +1,6 @@
 """Pictures that another camera took become captures, as if they had been taken here."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from app.capture.burst import BurstWatch, TakenBurst, take
@@ -22,15 +22,27 @@ def import_pictures(
     told: Conditions = UNTOLD,
     watch: BurstWatch = _UNWATCHED,
 ) -> list[TakenBurst]:
-    """One capture for each role that has pictures: mean, scatter and count of each pixel, and verdicts.
-
-    `names` are files, folders or patterns; `bits` are those of the counts, by default all that the files have. All
-    files are looked for, and their size is held against the scene's camera, before any capture is made. Raises
-    BadInputError.
-    """
+    """Import the pictures that `names` are: files, folders or patterns. See `import_files`. Raises BadInputError."""
     given: dict[CaptureRole, list[Path]] = {
         role: picture_files(names[role]) for role in ROLES if names.get(role)
     }
+    return import_files(experiment, given, bits, told, watch)
+
+
+def import_files(
+    experiment: Experiment,
+    given: Mapping[CaptureRole, list[Path]],
+    bits: int | None = None,
+    told: Conditions = UNTOLD,
+    watch: Watch = _UNWATCHED,
+    lossy: Collection[CaptureRole] = (),
+) -> list[TakenBurst]:
+    """One capture for each role that has pictures: mean, scatter and count of each pixel, and verdicts.
+
+    `bits` are those of the counts, by default all that the files have. Their size is held against the scene's
+    camera before any capture is made. `lossy` are roles whose pictures had been compressed before they became
+    these files. Raises BadInputError.
+    """
     if not given:
         raise BadInputError(
             "No picture was given. Name the pictures of at least one role: --reference, --flow."
@@ -42,7 +54,7 @@ def import_pictures(
     for role, files in given.items():
         with PictureFiles(files, bits) as pictures:
             plan = CapturePlan(role, pictures.frames, settle_frames=0, max_refused=0)
-            known = _verdicts(pictures)
+            known = _verdicts(pictures, pictures.lossy or role in lossy)
             one = take(pictures, experiment, plan, told, watch, source=pictures.origin, known=known)
         if one.shortfall:
             raise AirlensError(one.shortfall)
@@ -50,7 +62,7 @@ def import_pictures(
     return taken
 
 
-def _check_apart(given: dict[CaptureRole, list[Path]]) -> None:
+def _check_apart(given: Mapping[CaptureRole, list[Path]]) -> None:
     """Raise BadInputError for a picture that is named for two roles."""
     roles: dict[Path, str] = {}
     for role, files in given.items():
@@ -73,10 +85,10 @@ def _check_size(experiment: Experiment, pictures: PictureFiles, role: str) -> No
         )
 
 
-def _verdicts(pictures: PictureFiles) -> tuple[Verdict, ...]:
+def _verdicts(pictures: PictureFiles, lossy: bool) -> tuple[Verdict, ...]:
     """What the files themselves say of the pictures."""
     found = []
-    if pictures.lossy:
+    if lossy:
         found.append(
             Verdict(
                 "compression", False, 1.0, "pictures without loss (TIFF, PNG, raw)",

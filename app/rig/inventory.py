@@ -1,7 +1,7 @@
 """The cameras that a new experiment may choose from: what is plugged in, and one that computes its pictures."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -44,12 +44,19 @@ class CameraChoice:
     formats: tuple[FormatChoice, ...] = ()
 
 
+# What stands in the list for a simulated camera that looks at an uploaded room.
+_IN_AN_UPLOAD = "Simulated camera in the uploaded room"
 SIMULATED = CameraChoice("simulated", "", "Simulated camera in the packaged room", "", 12, 384, 288)
 
 
 def found_cameras(folder: Path = Path("/dev")) -> Sequence[CameraChoice]:
     """Every camera of the kernel, of the network and of USB3 Vision, then the simulated one."""
     return [*map(_v4l2, list_devices(folder)), *map(_aravis, list_aravis()), SIMULATED]
+
+
+def simulated_in(uploads: Sequence[str]) -> list[CameraChoice]:
+    """A simulated camera for each uploaded room, which it looks at; `device` is the upload."""
+    return [replace(SIMULATED, device=upload, name=f"{_IN_AN_UPLOAD} {upload}") for upload in uploads]
 
 
 def _v4l2(found: DeviceDescription) -> CameraChoice:

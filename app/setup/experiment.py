@@ -54,14 +54,17 @@ def new_experiment(folder: Path, text: str, source: str) -> Experiment:
         raise BadInputError(f"{folder} is not empty; give a new folder for the experiment.")
     answers = read_answers(text, source)
     with durable_folder(folder) as unfinished:
-        _fill(unfinished, answers, text)
+        _fill(unfinished, answers, text, truth_file(answers))
     return open_experiment(folder)
 
 
-def add_experiment(parent: Path, text: str) -> Experiment:
-    """The same in a folder with a fresh name in `parent`. Raises BadInputError."""
+def add_experiment(parent: Path, text: str, truth: Path | None) -> Experiment:
+    """The same in a folder with a fresh name in `parent`; a simulated camera looks at the room in `truth`.
+
+    Raises BadInputError.
+    """
     answers = read_answers(text, ANSWERS_FILE)
-    return open_experiment(new_folder(parent, "room", lambda folder: _fill(folder, answers, text)))
+    return open_experiment(new_folder(parent, "room", lambda folder: _fill(folder, answers, text, truth)))
 
 
 def answers_text(experiment: Experiment) -> str:
@@ -107,8 +110,7 @@ def _merged(
     return new.model_copy(update={"information": old.information, "rig": rig, "scene": scene})
 
 
-def _fill(folder: Path, answers: Answers, text: str) -> None:
-    truth = truth_file(answers)
+def _fill(folder: Path, answers: Answers, text: str, truth: Path | None) -> None:
     corner_m = corner_of(truth)
     create_experiment(folder, settings_of(answers, corner_m))
     write_text(folder / ANSWERS_FILE, text)

@@ -27,6 +27,12 @@ def largest_square_m(settings: BoardSettings, paper: str) -> float:
     return int(1e3 * max(fitting) + 1e-6) / 1e3
 
 
+def suited_board(paper: str) -> BoardSettings:
+    """A ChArUco board of 9 x 6 squares, as large as fits the paper. Raises BadInputError."""
+    unit = BoardSettings(kind="charuco", columns=9, rows=6, square_m=1.0)
+    return unit.model_copy(update={"square_m": largest_square_m(unit, paper)})
+
+
 def print_board(
     settings: BoardSettings, paper: str, out: Path | None = None, experiment: Experiment | None = None
 ) -> tuple[Path, Printed | None]:

@@ -36,7 +36,29 @@ class FoundCamera(Strict):
     width_px: int
     height_px: int
     error: str = ""
-    formats: list[FoundFormat] = Field(default_factory=list)
+    formats: tuple[FoundFormat, ...] = ()
+
+
+class FoundPort(Strict):
+    """A serial port, as the system describes it."""
+
+    device: str
+    description: str
+
+
+class AskPort(Strict):
+    """A serial port that was listed."""
+
+    device: str = Field(max_length=1000)
+
+
+class PortAnswer(Strict):
+    """Who answered on a port: the address to speak to it by, its name, its power state."""
+
+    found: bool
+    url: str = ""
+    name: str = ""
+    power: str = ""
 
 
 class SentAnswers(Strict):

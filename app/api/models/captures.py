@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from app.api.models.strict import Strict
+from app.api.models.strict import Named, Strict
 
 Role = Literal["reference", "flow", "dark", "flat"]
 
@@ -48,6 +48,21 @@ class NewCapture(Strict):
     every_s: float = Field(default=0.0, ge=0, le=86_400)
     ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
     minutes_on: float | None = Field(default=None, ge=0, le=1e6)
+
+
+class RolePictures(Strict):
+    """Uploaded pictures of one role: each upload is a picture, or a TIFF of many."""
+
+    role: Role
+    uploads: list[Named] = Field(min_length=1, max_length=1000)
+
+
+class NewImport(Strict):
+    """Pictures that another camera took. `bits` are those of the counts where the files hold more."""
+
+    pictures: list[RolePictures] = Field(min_length=1, max_length=4)
+    bits: int | None = Field(default=None, ge=1, le=16)
+    ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
 
 
 class Abort(Strict):

@@ -23,7 +23,7 @@ class Upload(Strict):
     """A file that was checked, read and kept; `reason` says why a `broken` one cannot be read any more."""
 
     upload: str
-    kind: Literal["png", "tiff", "npy", "npz", "broken"]
+    kind: Literal["png", "jpeg", "tiff", "npy", "npz", "broken"]
     bytes: int = 0
     sha256: str = ""
     received_s: float = 0.0

@@ -1,16 +1,22 @@
 """Answers about a rig and its room: templates, their check while somebody types, experiments made from them."""
 
-from typing import Any, Literal
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
+from pydantic import TypeAdapter
 
 from app.api.models.answers import (
     AnswersResource,
+    AskPort,
     CheckResource,
     FoundCamera,
+    FoundPort,
     MistakeResource,
     NewAnswers,
+    PortAnswer,
     RoomTold,
     SentAnswers,
     SupplyTold,
@@ -20,14 +26,20 @@ from app.api.models.calibrations import StandingResource
 from app.api.models.experiments import ExperimentResource
 from app.api.resources.calibrations import corners_on
 from app.api.resources.experiments import experiment_resource
-from app.api.services import Given
+from app.api.services import Given, Services
+from app.api.wire.bodies import body
 from app.api.wire.identifier import Identifier
+from app.api.wire.problems import ApiError
 from app.api.wire.revision import IfMatch, check_revision, etag
 from app.errors import BadInputError
 from app.experiment.folder import Experiment, ExperimentSettings
+from app.experiment.rig_settings import RealCameraSettings
 from app.files.toml import parse, to_plain, to_toml, toml_data
 from app.files.toml_errors import Said
-from app.rig.inventory import found_cameras
+from app.rig.cameras import open_real
+from app.rig.frame_statistics import jpeg_of
+from app.rig.inventory import CameraKind, found_cameras, simulated_in
+from app.rig.ports import found_ports, who_is_there
 from app.setup.answers import Answers
 from app.setup.experiment import (
     ANSWERS_FILE,
@@ -37,8 +49,8 @@ from app.setup.experiment import (
     answers_text,
     change_answers,
     corner_of,
+    room_of,
     template,
-    truth_file,
 )
 from app.setup.mistakes import field_name, mistakes_in
 from app.setup.scene import picture_on_wall_m, settings_of
@@ -46,12 +58,53 @@ from core.geometry import Box, Optics
 from core.scene import Inlet, ProjectedPattern
 
 router = APIRouter(tags=["answers"])
+JPEG_BODY = body("image/jpeg", "What the camera sees, its contrast stretched for the eyes.")
+# The exposure of a look.
+LOOK_S = 0.02
 
 
 @router.get("/devices/found")
 def list_found_cameras(given: Given) -> list[FoundCamera]:
-    """List the cameras that are plugged in, and the simulated one."""
-    return [FoundCamera.of(one) for one in found_cameras()]
+    """List the cameras that are plugged in, and simulated ones: in the packaged room, and in uploaded ones."""
+    return [FoundCamera.of(one) for one in (*found_cameras(), *simulated_in(given.uploads.rooms()))]
+
+
+@router.get("/devices/found/picture", response_class=Response, responses=JPEG_BODY)
+def read_found_picture(
+    given: Given,
+    kind: Annotated[CameraKind, Query()],
+    device: Annotated[str, Query(max_length=1000)],
+    pixel_format: Annotated[str, Query(max_length=40)],
+    width_px: Annotated[int, Query(gt=0, le=20_000)],
+    height_px: Annotated[int, Query(gt=0, le=20_000)],
+) -> Response:
+    """Return one picture of a camera that was found, for the eyes: is it this one?"""
+    named = (
+        one for one in found_cameras() if (one.kind, one.device) == (kind, device) and one.kind != "simulated"
+    )
+    if next(named, None) is None:
+        raise ApiError("not_found", f"There is no camera {device!r} here.", "Plug it in.")
+    wanted = {"kind": kind, "device": device, "pixel_format": pixel_format, "width_px": width_px}
+    told = TypeAdapter(RealCameraSettings).validate_python(
+        {**wanted, "height_px": height_px, "exposure_s": LOOK_S}
+    )
+    with open_real(told) as camera:
+        return Response(jpeg_of(camera.grab(), stretch=True), media_type="image/jpeg")
+
+
+@router.get("/devices/ports")
+def list_ports(given: Given) -> list[FoundPort]:
+    """List the serial ports; none is opened."""
+    return [FoundPort.of(one) for one in found_ports()]
+
+
+@router.post("/devices/ports/ask")
+def ask_port(given: Given, asked: AskPort) -> PortAnswer:
+    """Ask a serial port which projector is there: its power state and its name; nothing is switched."""
+    if asked.device not in [one.device for one in found_ports()]:
+        raise ApiError("not_found", f"There is no serial port {asked.device!r} here.", "Plug it in.")
+    found = who_is_there(asked.device)
+    return PortAnswer(found=False) if found is None else PortAnswer(found=True, **asdict(found))
 
 
 @router.get("/answers/templates")
@@ -65,20 +118,19 @@ def list_templates(given: Given) -> list[TemplateResource]:
 def check_answers(given: Given, sent: SentAnswers) -> CheckResource:
     """Return every mistake at its field; where there is none, what the answers make."""
     kept = None if sent.experiment is None else _kept(given.folders.open(sent.experiment))
-    wrong = _mistakes(sent.answers, kept)
+    wrong = _mistakes(given, sent.answers, kept)
     if wrong:
         lines = [MistakeResource(field=field_name(one.path), sentence=one.sentence) for one in wrong]
         return CheckResource(mistakes=lines, told=None)
     answers = parse(sent.answers, Answers, ANSWERS_FILE)
-    corner_m = (0.0, 0.0, 0.0) if answers.camera.truth not in ("", SAMPLE) else corner_of(truth_file(answers))
-    return CheckResource(mistakes=[], told=_told(settings_of(answers, corner_m)))
+    return CheckResource(mistakes=[], told=_told(settings_of(answers, corner_of(_room(given, sent.answers)))))
 
 
 @router.post("/experiments/from-answers", status_code=201)
 def create_from_answers(given: Given, new: NewAnswers, response: Response) -> ExperimentResource:
     """Make an experiment for a rig and a room."""
-    _refuse(_mistakes(new.answers, None))
-    made = add_experiment(given.folders.root, to_toml(new.answers))
+    _refuse(_mistakes(given, new.answers, None))
+    made = add_experiment(given.folders.root, to_toml(new.answers), _room(given, new.answers))
     given.ledger.append_event("experiment", {"experiment": made.folder.name, "created": True})
     return experiment_resource(made, response)
 
@@ -100,7 +152,7 @@ def put_answers(
         found = given.folders.open(experiment)
         kept = _kept(found)
         check_revision(if_match, {"revision": found.revision, "answers": kept}, {"answers": new.answers})
-        _refuse(_mistakes(new.answers, kept))
+        _refuse(_mistakes(given, new.answers, kept))
         changed = change_answers(found, to_toml(new.answers))
     given.ledger.append_event("experiment", {"experiment": experiment, "changed": True})
     return experiment_resource(changed, response)
@@ -110,14 +162,24 @@ def _kept(experiment: Experiment) -> dict[str, Any]:
     return toml_data(answers_text(experiment), ANSWERS_FILE)
 
 
-def _mistakes(data: dict[str, Any], kept: dict[str, Any] | None) -> list[Said]:
+def _room(given: Services, data: dict[str, Any]) -> Path | None:
+    """The room that a simulated camera of these answers looks at; None where nobody has it, or it has none."""
+    truth = _truth(data)
+    if not isinstance(truth, str) or not truth:
+        return None
+    return room_of(SAMPLE) if truth == SAMPLE else given.uploads.room(truth)
+
+
+def _mistakes(given: Services, data: dict[str, Any], kept: dict[str, Any] | None) -> list[Said]:
     """Every mistake; a request names no file of this machine, but may leave what an experiment was made with."""
     truth, before = _truth(data), _truth(kept or {})
     wrong = mistakes_in(data)
-    if truth in (None, "", SAMPLE) if kept is None else truth == before:
+    if truth in (None, "") or _room(given, data) is not None if kept is None else truth == before:
         return wrong
     expected = (
-        f"expected {SAMPLE!r}, the packaged room" if kept is None else "it cannot be changed afterwards"
+        f"expected {SAMPLE!r}, the packaged room, or an uploaded one"
+        if kept is None
+        else "it cannot be changed afterwards"
     )
     return [*wrong, Said(("camera", "truth"), f"{truth!r} is no room of this service; {expected}.")]
 

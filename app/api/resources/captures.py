@@ -1,5 +1,6 @@
 """Captures: take, watch, abort, keep or discard, look at, annotate."""
 
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,6 +16,7 @@ from app.api.models.captures import (
     CaptureResource,
     DeskResource,
     NewCapture,
+    NewImport,
     SettingResource,
     VerdictResource,
 )
@@ -25,6 +27,7 @@ from app.api.wire.problems import ApiError
 from app.api.wire.revision import IfMatch, check_revision, etag
 from app.api.wire.volumes import Encoding, pack
 from app.capture.burst import Order
+from app.capture.imported import import_files
 from app.capture.service import DeskState
 from app.errors import BadInputError
 from app.experiment.capture_files import BurstImage
@@ -32,8 +35,8 @@ from app.experiment.captures import load_capture
 from app.experiment.folder import read_manifest, revision_of
 from app.files.durable import write_text
 from app.files.reading import reading
-from app.rig.conditions import conditions_in
-from drivers.burst import CapturePlan
+from app.rig.conditions import Conditions, conditions_in
+from drivers.burst import CapturePlan, CaptureRole
 
 router = APIRouter(tags=["captures"])
 NOTES = "notes.txt"
@@ -65,6 +68,34 @@ def order_of(new: NewCapture) -> Order:
     content = new.model_dump()
     plan = {field.name: content[field.name] for field in fields(CapturePlan)}
     return Order(CapturePlan(**plan), new.bursts, new.every_s, conditions_in(content))
+
+
+@router.post("/experiments/{experiment}/captures/imported", status_code=201)
+def import_captures(given: Given, experiment: Identifier, new: NewImport) -> list[CaptureResource]:
+    """Make captures of uploaded pictures that another camera took; the uploads are removed."""
+    found = given.folders.open(experiment)
+    files: dict[CaptureRole, list[Path]] = {}
+    for one in new.pictures:
+        files[one.role] = [path for upload in one.uploads for path in _pictures(given, upload)]
+    lossy: list[CaptureRole] = [
+        one.role for one in new.pictures if "jpeg" in map(given.uploads.kind, one.uploads)
+    ]
+    told = Conditions(new.ambient_temperature_k)
+    taken = import_files(found, files, new.bits, told, lossy=lossy)
+    for one in new.pictures:
+        for upload in one.uploads:
+            given.uploads.delete(upload)
+    given.ledger.append_event("experiment", {"experiment": experiment, "changed": True})
+    return [_resource(burst.folder) for burst in taken if burst.folder is not None]
+
+
+def _pictures(given: Services, upload: str) -> Sequence[Path]:
+    found = given.uploads.pictures(upload)
+    if not found:
+        raise ApiError(
+            "not_found", f"There is no upload {upload!r} that holds pictures.", "Send the file again."
+        )
+    return found
 
 
 @router.get("/experiments/{experiment}/captures")

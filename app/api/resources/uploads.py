@@ -1,4 +1,4 @@
-"""Files that an operator sends: PNG, TIFF, NPY and NPZ, as the raw body of one request."""
+"""Files that an operator sends: PNG, JPEG, TIFF, NPY and NPZ, as the raw body of one request."""
 
 from typing import Any
 

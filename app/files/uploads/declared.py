@@ -19,9 +19,10 @@ from app.errors import BadInputError
 from app.files.reading import reading
 from app.files.uploads.tiff import tiff_pages
 
-Kind = Literal["png", "tiff", "npy", "npz"]
+Kind = Literal["png", "jpeg", "tiff", "npy", "npz"]
 HEAD_BYTES = 64
 MEMBERS = 64
+SEGMENTS = 200
 HEADER_BYTES = 10_000
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}\.npy")
 END_OF_DIRECTORY = struct.Struct("<4s4H2LH")
@@ -41,6 +42,8 @@ def kind_of(head: bytes) -> Kind:
     """Return the kind that the first bytes show; what the sender calls the file does not matter."""
     if head.startswith(b"\x89PNG\r\n\x1a\n"):
         return "png"
+    if head.startswith(b"\xff\xd8\xff"):
+        return "jpeg"
     if head[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
         return "tiff"
     if head.startswith(b"\x93NUMPY"):
@@ -48,7 +51,7 @@ def kind_of(head: bytes) -> Kind:
     if head.startswith(b"PK\x03\x04"):
         return "npz"
     raise BadInputError(
-        f"The file begins with {head[:8]!r}, which is none of PNG, TIFF, NPY and NPZ. Send one of those."
+        f"The file begins with {head[:8]!r}, which is none of PNG, JPEG, TIFF, NPY and NPZ. Send one of those."
     )
 
 
@@ -65,6 +68,8 @@ def declared_arrays(path: Path, kind: Kind, pixels: int, unpacked_bytes: int) ->
     with reading("The file", "Write it again."), path.open("rb") as file:
         if kind == "png":
             found = [_png(file.read(HEAD_BYTES), pixels)]
+        elif kind == "jpeg":
+            found = [_jpeg(file, pixels)]
         elif kind == "tiff":
             found = [
                 Declared(f"page{index}", (page.rows, page.cols), page.dtype, page.unpacked_bytes)
@@ -97,6 +102,25 @@ def _png(head: bytes, pixels: int) -> Declared:
             f"The PNG says it has {cols} x {rows} pixels; at most {pixels:,} are accepted. Crop or bin it."
         )
     return Declared("image", (rows, cols), f"uint{depth}", rows * cols * channels * depth // 8)
+
+
+def _jpeg(file: BinaryIO, pixels: int) -> Declared:
+    """The size in the frame's header, which at most so many segments stand before."""
+    file.seek(2)
+    for _ in range(SEGMENTS):
+        head = file.read(4)
+        if len(head) < 4 or head[0] != 0xFF:
+            break
+        marker, length = head[1], int.from_bytes(head[2:], "big")
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
+            depth, rows, cols, channels = struct.unpack(">BHHB", file.read(6))
+            if depth != 8 or channels not in (1, 3) or not 0 < rows * cols <= pixels:
+                break
+            return Declared("image", (rows, cols), "uint8", rows * cols * channels)
+        file.seek(length - 2, io.SEEK_CUR)
+    raise BadInputError(
+        f"The JPEG tells no size, or one above {pixels:,} pixels; expected 8 bits, grey or colour. Write it again."
+    )
 
 
 def _npy(file: BinaryIO, name: str, size_bytes: int) -> Declared:

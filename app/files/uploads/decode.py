@@ -8,7 +8,7 @@ import numpy as np
 
 def decode(kind: str, source: Path, folder: Path) -> list[dict[str, Any]]:
     """Write `folder/NAME.npy` for every array in `source`; return name, shape, type and range of each."""
-    readers = {"png": _png, "tiff": _tiff, "npy": _npy, "npz": _npz}
+    readers = {"png": _image, "jpeg": _image, "tiff": _tiff, "npy": _npy, "npz": _npz}
     found = []
     for name, array in readers[kind](source).items():
         np.save(folder / f"{name}.npy", array, allow_pickle=False)
@@ -32,12 +32,12 @@ def _summary(name: str, array: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _png(source: Path) -> dict[str, np.ndarray]:
+def _image(source: Path) -> dict[str, np.ndarray]:
     import cv2
 
     image = cv2.imread(str(source), cv2.IMREAD_UNCHANGED)
     if image is None:
-        raise ValueError("the PNG cannot be decoded")
+        raise ValueError("the picture cannot be decoded")
     return {"image": _grey(image)}
 
 
@@ -59,4 +59,7 @@ def _npz(source: Path) -> dict[str, np.ndarray]:
 
 def _grey(image: np.ndarray) -> np.ndarray:
     """A monochrome camera's colour file holds the same counts thrice; a true colour image is averaged."""
-    return image if image.ndim == 2 else image[..., :3].mean(-1).astype(np.float32)
+    if image.ndim == 2:
+        return image
+    mean = image[..., :3].mean(-1)
+    return np.rint(mean).astype(image.dtype) if image.dtype.kind == "u" else mean.astype(np.float32)

@@ -9,17 +9,23 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+
 from app.errors import BadInputError
-from app.files.durable import write_json
+from app.files.durable import write_durably, write_json
 from app.files.reading import read_json
 from app.files.uploads.declared import HEAD_BYTES, HEADER_BYTES, Kind, check_head, declared_arrays
 
 MANIFEST = "manifest.json"
+AGAIN = "Delete the upload and send the file again."
+# What a room volume has at least.
+ROOM_ARRAYS = ("x", "y", "z", "T", "u", "p", "T0")
+PICTURE_KINDS = ("png", "tiff", "jpeg")
 
 
 @dataclass(frozen=True)
@@ -71,7 +77,7 @@ class UploadStore:
         found = []
         for folder in self._folders():
             try:
-                found.append(read_json(folder / MANIFEST, "Delete the upload and send the file again."))
+                found.append(read_json(folder / MANIFEST, AGAIN))
             except BadInputError as error:
                 found.append({"upload": folder.name, "reason": str(error)})
         return sorted(found, key=_newest, reverse=True)
@@ -79,6 +85,34 @@ class UploadStore:
     def folder(self, upload: str) -> Path | None:
         """Return the folder of `upload` by listing, so that no path is made from what was asked."""
         return next((folder for folder in self._folders() if folder.name == upload), None)
+
+    def room(self, upload: str) -> Path | None:
+        """The room volume (NPZ) of an upload that holds one; packed when it is first asked for."""
+        folder = self.folder(upload)
+        if folder is None or not all((folder / f"{name}.npy").is_file() for name in ROOM_ARRAYS):
+            return None
+        packed = folder / "room.npz"
+        if not packed.is_file():
+            arrays = {path.stem: np.load(path, allow_pickle=False) for path in folder.glob("*.npy")}
+            write_durably(packed, lambda temporary: _save(temporary, arrays))
+        return packed
+
+    def rooms(self) -> Sequence[str]:
+        """The uploads that hold a room volume, newest first."""
+        named = [str(manifest["upload"]) for manifest in self.list() if manifest.get("kind") == "npz"]
+        return [upload for upload in named if self.room(upload) is not None]
+
+    def pictures(self, upload: str) -> Sequence[Path]:
+        """The arrays (NPY) of an upload that holds pictures; empty for any other."""
+        folder = self.folder(upload)
+        if folder is None or self.kind(upload) not in PICTURE_KINDS:
+            return []
+        return [folder / f"{one['name']}.npy" for one in read_json(folder / MANIFEST, AGAIN)["arrays"]]
+
+    def kind(self, upload: str) -> str:
+        """What kind of file it was; empty where there is no such upload."""
+        folder = self.folder(upload)
+        return "" if folder is None else str(read_json(folder / MANIFEST, AGAIN).get("kind"))
 
     def delete(self, upload: str) -> bool:
         """Remove an upload; False if there is none."""
@@ -144,6 +178,11 @@ def read_in_child(kind: Kind, source: Path, folder: Path, limits: UploadLimits) 
     refused = json.loads(done.stdout)["reason"] if done.stdout else None
     reason = refused or "it needs more memory or time than is allowed"
     raise BadInputError(f"The file cannot be read: {reason}. Check it in the program that wrote it.")
+
+
+def _save(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    with path.open("wb") as file:
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
 
 def _newest(manifest: dict[str, Any]) -> tuple[float, str]:

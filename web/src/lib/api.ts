@@ -94,6 +94,12 @@ export async function file<R extends Request>(request: R, given: Given<R>): Prom
   return reach("GET", address(request, given));
 }
 
+/** Sends a file to be kept, whose id later requests name. */
+export async function upload(content: Blob): Promise<Answer<"POST /uploads">> {
+  const answer = await reach("POST", address("POST /uploads", {}), content);
+  return (await answer.json()) as Answer<"POST /uploads">;
+}
+
 /** Exchanges the token in the address for a cookie that no script can read, and forgets it. */
 export async function openSession(): Promise<void> {
   const token = new URLSearchParams(location.hash.slice(1)).get("token");
@@ -110,8 +116,10 @@ async function reach(
   body?: unknown,
   headers: Record<string, string> = {},
 ): Promise<Response> {
-  const sent = body === undefined ? {} : { body: JSON.stringify(body) };
-  const type: Record<string, string> = body === undefined ? {} : { "Content-Type": "application/json" };
+  const isFile = body instanceof Blob;
+  const sent = body === undefined ? {} : { body: isFile ? body : JSON.stringify(body) };
+  const kind = isFile ? "application/octet-stream" : "application/json";
+  const type: Record<string, string> = body === undefined ? {} : { "Content-Type": kind };
   let answer: Response;
   try {
     answer = await fetch(path, { method, headers: { ...type, ...headers }, ...sent });

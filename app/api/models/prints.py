@@ -1,0 +1,37 @@
+"""What is printed for an experiment."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.api.models.board import BoardGeometry
+from app.api.models.strict import Strict
+
+
+class NewPattern(Strict):
+    """Sheets of the wall's pattern; `choose` first gives the scene the finest pattern that suits its camera."""
+
+    paper: str = Field(default="a3", max_length=20)
+    overlap_m: float = Field(default=0.01, ge=0, le=0.1)
+    choose: bool = False
+
+
+class NewBoard(Strict):
+    """A board to calibrate with: the rig's own unless given. Without `square_m` the largest that fits the paper."""
+
+    paper: str = Field(default="a3", max_length=20)
+    board: BoardGeometry | None = None
+
+
+class PrintedResource(Strict):
+    """A PDF that was made: rows and columns of its sheets, what is on them, and the finest period."""
+
+    what: Literal["pattern", "board"]
+    paper: str
+    sheets: list[int]
+    width_m: float
+    height_m: float
+    finest_period_m: float | None
+    finest_period_camera_px: float | None
+    created: str
+    is_of_the_scene: bool

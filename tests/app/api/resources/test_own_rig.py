@@ -1,0 +1,143 @@
+"""Doors of a lab's own rig: found cameras, ports, uploaded rooms, pictures of other cameras, prints."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import tifffile
+
+from app.client import Client, ServiceError
+from app.simulate.rehearsal import SAMPLE_ROOM
+from app.volume.file import read_volume
+from tests.app.api.conftest import Live
+from tests.drivers.aravis.fake import ADDRESS, fake_camera, missing, opened
+
+
+@pytest.fixture
+def client(live: Live) -> Iterator[Client]:
+    with Client(live.url, live.token) as open_client:
+        yield open_client
+
+
+def answers_of(client: Client, name: str) -> dict:
+    return next(one.answers for one in client.templates() if one.template == name)
+
+
+def room_file(folder: Path) -> Path:
+    """The packaged room without what is no number, as a lab exports it."""
+    with np.load(SAMPLE_ROOM, allow_pickle=False) as arrays:
+        kept = {name: arrays[name] for name in arrays.files if arrays[name].dtype.kind in "fiu"}
+    np.savez_compressed(folder / "room.npz", **kept)
+    return folder / "room.npz"
+
+
+def test_an_uploaded_room_stands_among_the_cameras_and_is_what_its_camera_looks_at(
+    client: Client, live: Live, tmp_path: Path
+):
+    upload = client.upload(room_file(tmp_path)).upload
+    (found,) = [one for one in client.found_cameras() if one.device == upload]
+    assert found.kind == "simulated"
+    sent = answers_of(client, "sample")
+    sent["camera"] = {**sent["camera"], "truth": upload}
+    checked = client.check_answers(sent)
+    assert checked.mistakes == []
+    made = client.create_from_answers(sent)
+    truth = live.app.state.services.folders.folder(made.experiment) / "truth.npz"
+    np.testing.assert_array_equal(read_volume(truth).velocity_m_s, read_volume(SAMPLE_ROOM).velocity_m_s)
+    client.delete_upload(upload)
+    assert upload not in [one.device for one in client.found_cameras()]
+    with pytest.raises(ServiceError, match="no room of this service"):
+        client.create_from_answers(sent)
+
+
+def test_an_upload_that_is_no_room_is_no_camera(client: Client, tmp_path: Path):
+    np.savez(tmp_path / "other.npz", x=np.zeros(3))
+    upload = client.upload(tmp_path / "other.npz").upload
+    assert upload not in [one.device for one in client.found_cameras()]
+
+
+@missing
+def test_a_found_camera_shows_a_picture(client: Client):
+    with fake_camera():
+        opened().close()
+        (found,) = [one for one in client.found_cameras() if one.kind == "aravis" and ADDRESS in one.name]
+        assert [one.pixel_format for one in found.formats] == ["Mono16", "Mono8"]
+        picture = cv2.imdecode(np.frombuffer(client.found_picture(found), np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert picture is not None
+    assert picture.shape == (found.height_px, found.width_px)
+    with pytest.raises(ServiceError, match="There is no camera"):
+        client.found_picture(found.model_copy(update={"device": "/dev/mem"}))
+
+
+def test_only_a_port_that_was_listed_is_asked(client: Client, tmp_path: Path):
+    assert all(one.device for one in client.ports())
+    with pytest.raises(ServiceError, match="no serial port"):
+        client.ask_port(str(tmp_path / "port"))
+
+
+def pictures(shape: tuple[int, int], shift: int) -> list[np.ndarray]:
+    draw = np.random.default_rng(3)
+    still = draw.integers(500, 3500, shape)
+    return [
+        np.roll(still, shift, 1).astype(np.uint16) + draw.integers(0, 30, shape).astype(np.uint16)
+        for _ in range(4)
+    ]
+
+
+def test_dropped_pictures_become_captures_as_import_makes_them(client: Client, live: Live, tmp_path: Path):
+    made = client.create_experiment(camera_px=64).experiment
+    tifffile.imwrite(tmp_path / "reference.tif", np.stack(pictures((48, 64), 0)), photometric="minisblack")
+    sent: dict = {"reference": [client.upload(tmp_path / "reference.tif").upload], "flow": []}
+    for number, picture in enumerate(pictures((48, 64), 1)):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), picture)
+        sent["flow"].append(client.upload(tmp_path / f"{number}.png").upload)
+    taken = client.import_captures(made, sent, bits=12)
+    assert [(one.role, one.frames, one.state) for one in taken] == [
+        ("reference", 4, "finished"),
+        ("flow", 4, "finished"),
+    ]
+    mean = client.capture_image(made, taken[0].capture)
+    np.testing.assert_allclose(mean, np.mean(pictures((48, 64), 0), axis=0) / 4095, atol=1e-6)
+    assert client.uploads() == [] or not {one.upload for one in client.uploads()} & {*sent["flow"]}
+
+
+def test_pictures_of_a_wrong_size_are_refused_with_both_sizes_and_jpeg_is_said_to_cost(
+    client: Client, tmp_path: Path
+):
+    made = client.create_experiment(camera_px=64).experiment
+    cv2.imwrite(str(tmp_path / "wide.png"), np.zeros((48, 100), np.uint8))
+    wrong = client.upload(tmp_path / "wide.png").upload
+    with pytest.raises(ServiceError, match=r"The flow pictures have 100 x 48 px; the camera .* has 64 x 48"):
+        client.import_captures(made, {"flow": [wrong]})
+    assert client.captures(made) == []
+    with pytest.raises(ServiceError, match="no upload 'u0'"):
+        client.import_captures(made, {"flow": ["u0"]})
+    names = []
+    for number in range(2):
+        grey = np.random.default_rng(number).integers(40, 200, (48, 64)).astype(np.uint8)
+        cv2.imwrite(str(tmp_path / f"{number}.jpg"), grey)
+        names.append(client.upload(tmp_path / f"{number}.jpg"))
+    assert {one.kind for one in names} == {"jpeg"}
+    (taken,) = client.import_captures(made, {"flow": [one.upload for one in names]})
+    assert any(one.name == "compression" and not one.good for one in taken.verdicts)
+
+
+def test_pattern_and_board_are_printed_and_read(client: Client, tmp_path: Path):
+    sent = answers_of(client, "empty")
+    sent["room"], sent["camera"] = ["1 m", "1 m", "0.6 m"], {**sent["camera"], "distance": "0.9 m"}
+    made = client.create_from_answers(sent).experiment
+    with pytest.raises(ServiceError, match="No pattern was printed"):
+        client.read_print(made, "pattern", tmp_path / "none.pdf")
+    printed = client.print_pattern(made, "a2")
+    assert printed.paper == "a2"
+    assert printed.is_of_the_scene
+    assert client.read_print(made, "pattern", tmp_path / "pattern.pdf").read_bytes().startswith(b"%PDF")
+    board = client.print_board(made, "a4")
+    assert (board.what, board.paper, board.sheets) == ("board", "a4", [1, 1])
+    assert client.read_print(made, "board", tmp_path / "board.pdf").read_bytes().startswith(b"%PDF")
+    assert client.experiment(made).settings["rig"]["board"]["kind"] == "charuco"
+    assert [one.what for one in client.prints(made)] == ["pattern", "board"]
+    with pytest.raises(ServiceError, match="a4"):
+        client.print_pattern(made, "a9")
