@@ -79,8 +79,8 @@ class V4l2CameraSettings(Strict):
     """Rows."""
     bits: Annotated[int, Field(ge=1, le=16)] = 16
     """Digits of a count."""
-    exposure_s: Annotated[float, Field(gt=0, le=60)]
-    """Exposure of a frame."""
+    exposure_s: Annotated[float | None, Field(gt=0, le=60)] = None
+    """Exposure of a frame; the camera's own unless given."""
     gain: float | None = None
     """In the camera's own unit; its own unless given."""
     frame_rate_hz: Annotated[float | None, Field(gt=0, le=10_000)] = None
@@ -108,8 +108,8 @@ class AravisCameraSettings(Strict):
     """Rows."""
     bits: Annotated[int, Field(ge=1, le=16)] = 8
     """Digits of a count."""
-    exposure_s: Annotated[float, Field(gt=0, le=60)]
-    """Exposure of a frame."""
+    exposure_s: Annotated[float | None, Field(gt=0, le=60)] = None
+    """Exposure of a frame; the camera's own unless given."""
     gain: float | None = None
     """In the camera's own unit; its own unless given."""
     frame_rate_hz: Annotated[float | None, Field(gt=0, le=10_000)] = None

@@ -154,6 +154,6 @@ def _ask_place(tree: Tree) -> Asked:
             tree, ("camera", "distance"), "Distance of the camera to the patterned wall", "m"
         )
     yield Told(picture_told(settings_of(parse(tree, Answers, ANSWERS_FILE)).scene))
-    yield from ask_field(tree, ("camera", "exposure"), "Exposure", "ms")
+    yield from ask_field(tree, ("camera", "exposure"), "Exposure", "ms", can_be_open=True)
     tree["camera"].setdefault("frames", 100)
     yield from ask_number(tree, ("camera", "frames"), "Frames that are averaged")

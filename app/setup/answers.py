@@ -38,8 +38,8 @@ class CameraAnswer(Strict):
     """Columns."""
     height_px: Pixels
     """Rows."""
-    exposure: Time = 0.02
-    """Exposure of a frame."""
+    exposure: Time | None = None
+    """Exposure of a frame; the camera's own unless given."""
     frames: Annotated[int, Field(ge=1, le=100_000)] = 100
     """How many frames are averaged into one picture."""
     angle_of_view: Angle | None = None

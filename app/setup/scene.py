@@ -136,7 +136,8 @@ def _light(answers: Answers, camera: Optics, room: Box) -> Light:
 def _rig(answers: Answers) -> RigSettings:
     camera, projector = answers.camera, answers.projector
     if camera.kind == "simulated":
-        device = SimulatedCameraSettings(room=TRUTH_FILE, exposure_s=camera.exposure)
+        told = {"room": TRUTH_FILE} | ({} if camera.exposure is None else {"exposure_s": camera.exposure})
+        device = SimulatedCameraSettings.model_validate(told)
     else:
         told = {
             "kind": camera.kind,

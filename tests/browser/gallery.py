@@ -47,7 +47,7 @@ def furnish(station: Station, planned: bool) -> None:
 def shoot(page: Page, folder: Path, name: str) -> None:
     """Every page, whole; sticky parts where they are at the top."""
     page.goto(page.url.split("#")[0] + "#/new")
-    page.get_by_role("radio", name="Simulated camera").check()
+    page.get_by_role("radio", name="packaged room").check()
     expect(page.locator("button.next")).to_have_text("Create the experiment")
     page.screenshot(path=str(folder / f"0-New-{name}.png"), full_page=True)
     for number, title in enumerate(PAGES, 1):

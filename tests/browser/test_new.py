@@ -1,9 +1,13 @@
 """A new experiment by the page alone: from an empty data folder to a solved room, and its room changed later."""
 
 import re
+from pathlib import Path
 
+import cv2
+import numpy as np
 from playwright.sync_api import Locator, Page, expect
 
+from tests.app.api.resources.test_own_rig import room_file
 from tests.browser.conftest import Opens, Station, snapshot
 from tests.browser.test_story import PAINTED
 
@@ -37,7 +41,7 @@ def chosen(station: Station, opens: Opens) -> Hand:
     """The simulated camera is chosen from the list of those found."""
     hand = Hand(opens(station.address).page)
     hand.click(hand.page.get_by_role("button", name="New experiment"))
-    hand.click(hand.page.get_by_role("radio", name=re.compile("Simulated camera")))
+    hand.click(hand.page.get_by_role("radio", name=re.compile("packaged room")))
     return hand
 
 
@@ -67,6 +71,89 @@ def test_from_an_empty_folder_to_a_solved_room(station: Station, opens: Opens):
     expect(page.locator("main")).to_contain_text("made with another room")
     page.get_by_role("button", name="Solve again").click()
     expect(page.locator("footer")).to_contain_text("1 job in progress")
+
+
+def type_in(hand: Hand, thing: str, entries: dict[str, str]) -> None:
+    """Choosing a field and typing are two; choosing from a list is one."""
+    group = hand.page.get_by_role("group", name=thing).first
+    for label, text in entries.items():
+        if label == "Wall":
+            group.get_by_role("combobox").first.select_option(text)
+            hand.done += 1
+        else:
+            group.get_by_label(label, exact=True).fill(text)
+            hand.done += 2
+
+
+def test_a_room_that_the_page_does_not_know_is_typed_in_from_a_tape_measure(
+    station: Station, opens: Opens, tmp_path: Path
+):
+    """The packaged room, sent as somebody's own: wrong by 1 cm, 0.3 K and 5 % of the flow, each as a tape may be."""
+    watched = opens(station.address)
+    hand = Hand(watched.page)
+    page = hand.page
+    hand.click(page.get_by_role("button", name="New experiment"))
+    page.get_by_label("Another room for a simulated camera").set_input_files(room_file(tmp_path))
+    hand.done += 2
+    expect(page.get_by_role("radio", name=re.compile("uploaded room"))).to_be_checked()
+    for label, text in {"Length along x": "4.11", "Depth along y": "2.99", "Height along z": "3.01"}.items():
+        hand.fill(label, text)
+    type_in(hand, "supply 1", {"y from": "1.21", "y to": "1.81", "z from": "1.59", "z to": "1.79"})
+    type_in(hand, "supply 1", {"Flow": "227 m3/h", "Temperature": "30.3"})
+    type_in(
+        hand,
+        "outlet 1",
+        {"Wall": "x_min", "y from": "1.19", "y to": "1.79", "z from": "0.21", "z to": "0.61"},
+    )
+    type_in(hand, "outlet 1", {"Temperature (empty: unknown)": "24.7"})
+    hand.click(page.get_by_role("button", name="Remove thermometer 1"))
+    expect(page.locator("main")).to_contain_text("Supply 1: 227 m³/h, 0.53 m/s")
+    snapshot(page, "new-typed")
+    hand.next_step("Create the experiment")
+    hand.next_step("Calibrate")
+    hand.next_step("Take the reference")
+    hand.next_step("Take the flow")
+    hand.click(page.get_by_role("button", name="Reconstruct", exact=True).first)
+    hand.click(page.get_by_role("radio", name=re.compile("^draft")))
+    hand.next_step("Reconstruct")
+    hand.next_step("Look at the result")
+    expect(page.locator(".slice canvas").first).to_have_attribute("data-painted", PAINTED)
+    print(f"interactions: {hand.done}")
+    assert hand.done <= 60
+    assert watched.complaints == []
+
+
+def test_pictures_of_another_camera_are_brought_and_what_is_printed_is_a_pdf(
+    station: Station, opens: Opens, tmp_path: Path
+):
+    watched = opens(station.address)
+    page = watched.page
+    page.get_by_role("button", name="New experiment").click()
+    page.get_by_role("radio", name=re.compile("packaged room")).check()
+    Hand(page).next_step("Create the experiment")
+    page.get_by_role("combobox", name="Paper").select_option("a0")
+    page.get_by_role("button", name="Make a board").click()
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Board (PDF)").click()
+    assert Path(download.value.path()).read_bytes().startswith(b"%PDF")
+    snapshot(page, "print")
+    page.locator("nav").get_by_role("button", name="Capture").click()
+    page.get_by_text("Import pictures that another camera took").click()
+    files = []
+    for number in range(3):
+        picture = np.random.default_rng(number).integers(40, 200, (288, 384)).astype(np.uint8)
+        files.append(tmp_path / f"frame{number}.png")
+        cv2.imwrite(str(files[-1]), picture)
+    page.get_by_label("Reference: still air").last.set_input_files(files)
+    page.get_by_role("button", name="Import 3 files").click()
+    expect(page.locator(".library li")).to_have_count(1)
+    expect(page.locator(".library li").first).to_contain_text("3 frames, 384 × 288 px")
+    snapshot(page, "import")
+    wrong = tmp_path / "small.png"
+    cv2.imwrite(str(wrong), np.zeros((48, 64), np.uint8))
+    page.get_by_label("Flow: the air moving").last.set_input_files(wrong)
+    page.get_by_role("button", name="Import 1 files").click()
+    expect(page.get_by_role("alert")).to_contain_text("The flow pictures have 64 x 48 px")
 
 
 def test_a_mistake_is_told_at_its_field_while_it_is_typed_and_can_be_undone(station: Station, opens: Opens):

@@ -59,8 +59,6 @@ from core.scene import Inlet, ProjectedPattern
 
 router = APIRouter(tags=["answers"])
 JPEG_BODY = body("image/jpeg", "What the camera sees, its contrast stretched for the eyes.")
-# The exposure of a look.
-LOOK_S = 0.02
 
 
 @router.get("/devices/found")
@@ -85,9 +83,7 @@ def read_found_picture(
     if next(named, None) is None:
         raise ApiError("not_found", f"There is no camera {device!r} here.", "Plug it in.")
     wanted = {"kind": kind, "device": device, "pixel_format": pixel_format, "width_px": width_px}
-    told = TypeAdapter(RealCameraSettings).validate_python(
-        {**wanted, "height_px": height_px, "exposure_s": LOOK_S}
-    )
+    told = TypeAdapter(RealCameraSettings).validate_python({**wanted, "height_px": height_px})
     with open_real(told) as camera:
         return Response(jpeg_of(camera.grab(), stretch=True), media_type="image/jpeg")
 

@@ -30,7 +30,7 @@ def test_every_key_has_its_meaning(kind):
     [
         "| `exposure_s` | Exposure of a frame. | s | above 0 to 60 | `0.02` | `0.02` |",
         "| `temperature_k` | Its temperature. | K | 150 to 5000 |  | `299.15` |",
-        '| `exposure` | Exposure of a frame. | time | 1e-06 to 60 s | `"0.02 s"` | `"20 ms"` |',
+        '| `pixel_pitch` | From one pixel of the sensor to the next. | length | 1e-07 to 500 m | - | `"5.86 um"` |',
         '| `steps` | Steps along a ray. |  | `"auto"`, 1 to 16384 | `"auto"` | `"auto"` |',
         "| `bands` | Octaves. |  | 1 to 12 | `4` | `4` |",
     ],
