@@ -4,6 +4,7 @@ import contextlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 
 from app.calibrate.parts import Part, parts_of
@@ -21,12 +22,32 @@ from app.experiment.rig_settings import RealCameraSettings
 from core.scene import FixedTexture
 
 
+class Step(StrEnum):
+    """The steps of the work, in their order."""
+
+    camera = "camera"
+    plan = "plan"
+    print_pattern = "print pattern"
+    print_board = "print board"
+    calibrate = "calibrate"
+    reference = "reference"
+    flow = "flow"
+    reconstruct = "reconstruct"
+    report = "report"
+    export = "export"
+
+
 @dataclass(frozen=True)
 class Next:
-    """The command that comes next, and why."""
+    """The step that comes next, the command that does it, and why."""
 
+    step: Step
     command: str
     reason: str
+
+
+# What a rig can be measured with without.
+ADVISED = frozenset({Step.plan, Step.print_pattern, Step.print_board})
 
 
 @dataclass(frozen=True)
@@ -55,14 +76,19 @@ def whereabouts(folder: Path, shown: str = "") -> Whereabouts:
     return Whereabouts(str(folder), experiment.settings.title, told, following)
 
 
-def next_step(experiment: Experiment, shown: str) -> Next:
-    """The first step of the work that is not done. Raises BadInputError for files that cannot be read."""
-    for rule in (_of_the_rig, _of_the_print, _of_the_calibration, _of_the_captures, _of_the_results):
+def next_step(experiment: Experiment, shown: str, advised: bool = True) -> Next:
+    """The first step of the work that is not done; `advised` ones may be passed over.
+
+    Raises BadInputError for files that cannot be read.
+    """
+    rules = (_of_the_rig, _of_the_plan, _of_the_print, _of_the_calibration, _of_the_captures, _of_the_results)
+    for rule in rules:
         found = rule(experiment, shown)
-        if found is not None:
+        if found is not None and (advised or found.step not in ADVISED):
             return found
     newest = experiment.latest_result()
     return Next(
+        Step.export,
         f"airlens export {shown}",
         f"{newest / 'report.html'} is there to be read. Other programs read exports",
     )
@@ -72,11 +98,18 @@ def _of_the_rig(experiment: Experiment, shown: str) -> Next | None:
     taken = finished(experiment.captures_folder)
     if experiment.settings.rig.camera is None and not taken:
         return Next(
+            Step.camera,
             "airlens devices --full",
             "no camera is named: write one of these under [rig.camera] in experiment.toml",
         )
-    if not taken and not (experiment.folder / PLAN_FILE).is_file():
-        return Next(f"airlens plan {shown}", "nothing is measured yet: see first what this rig would see")
+    return None
+
+
+def _of_the_plan(experiment: Experiment, shown: str) -> Next | None:
+    if not finished(experiment.captures_folder) and not (experiment.folder / PLAN_FILE).is_file():
+        return Next(
+            Step.plan, f"airlens plan {shown}", "nothing is measured yet: see first what this rig would see"
+        )
     return None
 
 
@@ -88,13 +121,17 @@ def _of_the_print(experiment: Experiment, shown: str) -> Next | None:
     if isinstance(experiment.settings.scene.light, FixedTexture):
         printed = read_printed(experiment, "pattern")
         if printed is None:
-            return Next(f"airlens print pattern {shown}", "the wall needs its pattern")
+            return Next(Step.print_pattern, f"airlens print pattern {shown}", "the wall needs its pattern")
         if not is_of_the_scene(printed, experiment):
             return Next(
-                f"airlens print pattern {shown}", "the scene's pattern is another than the printed one"
+                Step.print_pattern,
+                f"airlens print pattern {shown}",
+                "the scene's pattern is another than the printed one",
             )
     if rig.board is None and _missing(experiment)[:1] == ["camera"]:
-        return Next(f"airlens print board {shown}", "the rig names no board to calibrate with")
+        return Next(
+            Step.print_board, f"airlens print board {shown}", "the rig names no board to calibrate with"
+        )
     return None
 
 
@@ -102,7 +139,9 @@ def _of_the_calibration(experiment: Experiment, shown: str) -> Next | None:
     missing = _missing(experiment)
     if not missing:
         return None
-    return Next(f"airlens calibrate {missing[0]} {shown}", f"not calibrated yet: {', '.join(missing)}")
+    return Next(
+        Step.calibrate, f"airlens calibrate {missing[0]} {shown}", f"not calibrated yet: {', '.join(missing)}"
+    )
 
 
 def _of_the_captures(experiment: Experiment, shown: str) -> Next | None:
@@ -112,6 +151,7 @@ def _of_the_captures(experiment: Experiment, shown: str) -> Next | None:
     for role, reason in reasons.items():
         if not roles[role]:
             return Next(
+                Step(role),
                 f"airlens capture {role} {shown} --frames {frames}",
                 f"the {role} is missing: take it {reason}",
             )
@@ -121,16 +161,16 @@ def _of_the_captures(experiment: Experiment, shown: str) -> Next | None:
 def _of_the_results(experiment: Experiment, shown: str) -> Next | None:
     command = f"airlens reconstruct {shown}"
     if experiment.checkpoint_folder.is_dir():
-        return Next(command, "a reconstruction was stopped: it goes on from there")
+        return Next(Step.reconstruct, command, "a reconstruction was stopped: it goes on from there")
     results = finished(experiment.results_folder)
     if not results:
-        return Next(command, "both captures are there")
+        return Next(Step.reconstruct, command, "both captures are there")
     used = read_manifest(results[-1]).get("captures", {})
     newest = {role: experiment.latest_capture(role).name for role in ("reference", "flow")}
     if isinstance(used, dict) and any(used.get(role, name) != name for role, name in newest.items()):
-        return Next(command, "there are newer captures than those of the newest result")
+        return Next(Step.reconstruct, command, "there are newer captures than those of the newest result")
     if not (results[-1] / "report.html").is_file():
-        return Next(f"airlens report {shown}", "the newest result has no report")
+        return Next(Step.report, f"airlens report {shown}", "the newest result has no report")
     return None
 
 

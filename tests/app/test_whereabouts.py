@@ -18,7 +18,7 @@ from app.experiment.rig_settings import (
     V4l2CameraSettings,
 )
 from app.sheets.pattern import print_pattern
-from app.whereabouts import whereabouts
+from app.whereabouts import Step, next_step, whereabouts
 from tests.app.files.test_toml import example
 from tests.app.sheets.test_pattern import experiment as printable
 from tests.app.test_imports import HEAVY
@@ -155,3 +155,9 @@ def test_elsewhere_it_lists_the_commands_in_the_order_of_the_work_and_loads_noth
 def test_a_folder_without_experiments_is_said_to_be_one(tmp_path):
     told = CliRunner().invoke(create_cli(), ["status", str(tmp_path)])
     assert "is no experiment, and holds none" in str(told.exception)
+
+
+def test_what_is_only_advised_is_passed_over_by_the_page(tmp_path):
+    made = with_rig(printable(tmp_path / "wall"), camera=CAMERA)
+    assert next_step(made, "EXP").step is Step.plan
+    assert next_step(made, "EXP", advised=False).step is Step.calibrate

@@ -8,6 +8,25 @@ from app.api.models.board import BoardGeometry
 from app.api.models.strict import Strict
 
 
+class NextResource(Strict):
+    """The first step of the work that is not done, the command that does it, and why."""
+
+    step: Literal[
+        "camera",
+        "plan",
+        "print pattern",
+        "print board",
+        "calibrate",
+        "reference",
+        "flow",
+        "reconstruct",
+        "report",
+        "export",
+    ]
+    command: str
+    reason: str
+
+
 class ExperimentLine(Strict):
     """One line of the list of experiments; `uncalibrated` names the parts of the rig that need it still.
 
@@ -28,6 +47,7 @@ class ExperimentLine(Strict):
     results: int
     changed: str
     revision: str
+    next: NextResource | None = None
     reason: str = ""
 
 

@@ -8,7 +8,13 @@ from typing import Any
 from fastapi import APIRouter, Response
 
 from app.api.folders import shown_name
-from app.api.models.experiments import ExperimentChange, ExperimentLine, ExperimentResource, NewExperiment
+from app.api.models.experiments import (
+    ExperimentChange,
+    ExperimentLine,
+    ExperimentResource,
+    NewExperiment,
+    NextResource,
+)
 from app.api.services import Given, Services
 from app.api.wire.board import board_settings
 from app.api.wire.identifier import Identifier
@@ -21,6 +27,7 @@ from app.experiment.plan import PLAN_FILE
 from app.files.reading import reading
 from app.files.toml import to_plain
 from app.simulate.rehearsal import Rehearsal, rehearse
+from app.whereabouts import next_step
 from core.scene import ProjectedPattern
 
 router = APIRouter(tags=["experiments"])
@@ -120,7 +127,17 @@ def _line(experiment: Experiment) -> ExperimentLine:
         results=len(finished(experiment.results_folder)),
         changed=_changed(experiment.folder),
         revision=experiment.revision,
+        next=_next(experiment),
     )
+
+
+def _next(experiment: Experiment) -> NextResource | None:
+    """What comes next, as `airlens status` tells it, without what is only advised; None where files are broken."""
+    try:
+        found = next_step(experiment, experiment.folder.name, advised=False)
+    except BadInputError:
+        return None
+    return NextResource(step=found.step.value, command=found.command, reason=found.reason)
 
 
 def experiment_resource(experiment: Experiment, response: Response) -> ExperimentResource:

@@ -156,13 +156,14 @@ class Bench {
   async refreshExperiment(): Promise<void> {
     if (!this.experiment) return;
     const here = { experiment: this.experiment };
-    const [captures, results] = await Promise.all([
+    const [captures, results, experiments] = await Promise.all([
       ask("GET /experiments/{experiment}/captures", here),
       ask("GET /experiments/{experiment}/results", here),
+      ask("GET /experiments", {}),
     ]);
     // An answer about an experiment that is no longer open is not shown.
     if (here.experiment !== this.experiment) return;
-    [this.captures, this.results] = [captures, results];
+    [this.captures, this.results, this.experiments] = [captures, results, experiments];
     const finished = this.results.filter((one) => one.state === "finished");
     if (!finished.some((one) => one.result === this.result)) this.result = finished[0]?.result ?? null;
   }
@@ -291,7 +292,6 @@ class Bench {
   private nextStep(): Step {
     const running = this.ownDesk?.state === "running";
     const job = this.active.find((one) => one.experiment === this.experiment);
-    const has = (role: string) => this.finished.some((one) => one.role === role);
     const step = (label: string, page: Page, act: () => Promise<unknown>, busy = false) => ({ label, page, act, busy });
     const nothing = () => Promise.resolve();
     if (this.offered?.page === this.page) return this.offered;
@@ -303,15 +303,18 @@ class Bench {
       const { role, done, total } = this.ownDesk!;
       return step(`Taking the ${role}: ${done} of ${total}`, "Capture", nothing, true);
     }
-    if (!this.current?.calibrated) {
+    // What is not done yet is told by the service, as it tells `airlens status`.
+    const next = this.current?.next?.step;
+    if (next === "camera") return step("Name the camera", "Room", nothing, this.page === "Room");
+    if (next === "calibrate") {
       const first = this.current?.uncalibrated[0] ?? "rig";
       if (this.current?.camera === "simulated" && first === "camera")
         return step("Calibrate", "Calibrate", () => this.calibrate());
       // A real rig, or one that was begun with, is calibrated by its operator: the guide says what to show.
       return step(`Calibrate the ${first}`, "Calibrate", nothing, this.page === "Calibrate");
     }
-    if (!has("reference")) return step("Take the reference", "Capture", () => this.capture("reference", 100));
-    if (!has("flow")) return step("Take the flow", "Capture", () => this.capture("flow", 100));
+    if (next === "reference" || next === "flow")
+      return step(`Take the ${next}`, "Capture", () => this.capture(next, 100));
     if (job) {
       const share = job.steps ? `: ${Math.round(100 * job.progress)} %` : " …";
       return step(`${job.kind === "plan" ? "Planning" : "Reconstructing"}${share}`, "Reconstruct", nothing, true);
@@ -319,7 +322,8 @@ class Bench {
     const last = this.jobs.find((one) => one.experiment === this.experiment && one.kind === "reconstruct");
     if (!this.result && last && ["failed", "cancelled"].includes(last.state))
       return step("Retry the reconstruction", "Reconstruct", () => this.act(last, "retry"));
-    if (!this.result) return step("Reconstruct", "Reconstruct", () => this.reconstruct(this.preset));
+    if (next === "reconstruct" || !this.result)
+      return step("Reconstruct", "Reconstruct", () => this.reconstruct(this.preset));
     if (this.page !== "Look") return step("Look at the result", "Look", nothing);
     return step("Export NetCDF", "Look", () => this.export("nc"));
   }
