@@ -34,7 +34,7 @@ def import_files(
     given: Mapping[CaptureRole, list[Path]],
     bits: int | None = None,
     told: Conditions = UNTOLD,
-    watch: Watch = _UNWATCHED,
+    watch: BurstWatch = _UNWATCHED,
     lossy: Collection[CaptureRole] = (),
 ) -> list[TakenBurst]:
     """One capture for each role that has pictures: mean, scatter and count of each pixel, and verdicts.
