@@ -43,7 +43,9 @@ def seen_picture(
 def _as_it_is(experiment: Experiment, settings: SimulatedCameraSettings) -> Scene:
     """The scene with the simulated room's own walls: what was stated of them may be wrong by a centimetre."""
     scene, path = experiment.settings.scene, experiment.folder / settings.room
-    return replace(scene, room=room_box(read_volume(path)), boundary=()) if path.is_file() else scene
+    return (
+        replace(scene, room=room_box(read_volume(path)), boundary=(), objects=()) if path.is_file() else scene
+    )
 
 
 def _rendered(

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.app.api.resources.test_own_rig import room_file
@@ -85,6 +86,7 @@ def type_in(hand: Hand, thing: str, entries: dict[str, str]) -> None:
             hand.done += 2
 
 
+@pytest.mark.timeout(1500)
 def test_a_room_that_the_page_does_not_know_is_typed_in_from_a_tape_measure(
     station: Station, opens: Opens, tmp_path: Path
 ):
@@ -116,6 +118,8 @@ def test_a_room_that_the_page_does_not_know_is_typed_in_from_a_tape_measure(
     hand.click(page.get_by_role("button", name="Reconstruct", exact=True).first)
     hand.click(page.get_by_role("radio", name=re.compile("^draft")))
     hand.next_step("Reconstruct")
+    # The one step that computes: a busy machine may take minutes.
+    expect(page.locator("button.next")).to_have_text("Look at the result", timeout=600_000)
     hand.next_step("Look at the result")
     expect(page.locator(".slice canvas").first).to_have_attribute("data-painted", PAINTED)
     print(f"interactions: {hand.done}")
