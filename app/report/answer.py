@@ -39,7 +39,7 @@ def advice(finding: Finding) -> tuple[str, ...]:
 
 def _air(finding: Finding) -> str:
     figures = {one.key: one for one in finding.indoor.quantities}
-    levels_k = np.nanmean(finding.solution.temperature_k, axis=(0, 1), dtype=np.float64)
+    levels_k = np.asarray(np.nanmean(finding.solution.temperature_k.astype(np.float64), axis=(0, 1)))
     higher = f"{abs(levels_k[-1] - levels_k[0]):.1f} K {'warmer' if levels_k[-1] > levels_k[0] else 'colder'}"
     warm = f"Where people are the air is {_value(figures['temperature_mean'], '°C')} on the mean"
     moving = ""

@@ -221,7 +221,7 @@ def _heights(solution: Solution, there: np.ndarray) -> Figures:
     head, ankle = (at_height(solution.temperature_k, solution.z_m, height) for height in (HEAD_M, ANKLE_M))
     upwards_k = np.asarray(head - ankle, np.float64)[there.any(axis=2)]
     upwards_k = upwards_k[~np.isnan(upwards_k)]
-    levels_k = np.nanmean(solution.temperature_k, axis=(0, 1), dtype=np.float64)
+    levels_k = np.asarray(np.nanmean(solution.temperature_k.astype(np.float64), axis=(0, 1)))
     return {
         "head_to_ankle": float(upwards_k.mean()),
         "head_to_ankle_p95": float(np.percentile(upwards_k, 95)),

@@ -53,13 +53,13 @@ def derived_maps(solution: Solution, scene: Scene, occupant: Occupant = Occupant
     except SettingError:  # `indoor` says why
         pass
     return tuple(
-        Derived(name, *_LABELS[name], *(_of_air(f, air) for f in fields)) for name, fields in made.items()
+        Derived(name, *_LABELS[name], np.where(air, values, np.nan), *(_of_air(end, air) for end in ends))
+        for name, (values, *ends) in made.items()
     )
 
 
-def _of_air(values: Volume | None, air: Bool[np.ndarray, "vx vy vz"]) -> Volume | None:
-    """Without what is not air."""
-    return None if values is None else np.where(air, values, np.nan)
+def _of_air(end: Volume | None, air: Bool[np.ndarray, "nx ny nz"]) -> Volume | None:
+    return None if end is None else np.where(air, end, np.nan)
 
 
 def _of_places(

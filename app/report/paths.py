@@ -23,7 +23,8 @@ def write_vtu(path: Path, solution: Solution) -> None:
             "This result has no velocity to follow. Solve with a preset that finds it: standard."
         )
     solution = solution.filled()
-    speed_m_s = float(np.sqrt(np.mean(np.sum(np.square(solution.velocity_m_s, dtype=np.float64), axis=-1))))
+    velocity_m_s = np.asarray(solution.velocity_m_s, np.float64)
+    speed_m_s = float(np.sqrt(np.mean(np.sum(np.square(velocity_m_s), axis=-1))))
     if speed_m_s == 0.0:
         raise BadInputError("The air of this result stands still everywhere: there is no path to draw.")
     axes = (solution.x_m, solution.y_m, solution.z_m)
