@@ -102,8 +102,8 @@ def shared_m(one: RoomObject, other: RoomObject) -> Vector3:
 class ReadyObject:
     """A kind of object that rooms often hold: its size, its heat, and where both come from."""
 
-    size_m: Vector3
-    """Extent along x, y, z, as seen by the camera."""
+    size_m: Vector3 | None = None
+    """Extent along x, y, z, as seen by the camera; None for one that has none of its own."""
     power_w: float | None = None
     """Its convective heat; None for one that gives none."""
     power_std_w: float = 15.0
@@ -115,6 +115,7 @@ class ReadyObject:
 # A person's power is all the sensible heat. A third to two thirds of it leaves as radiation and reaches the air by
 # way of the walls; the deviation covers that.
 READY: dict[str, ReadyObject] = {
+    "box": ReadyObject(source="as it is told"),
     "seated_person": ReadyObject(
         size_m=(0.4, 0.4, 1.2), power_w=75.0, power_std_w=20.0,
         source="75 W sensible, office work: ASHRAE Fundamentals 2017, ch. 18, table 1; "
@@ -139,12 +140,18 @@ READY: dict[str, ReadyObject] = {
 }  # fmt: skip
 
 
-def ready_object(kind: str, name: str, foot_m: Vector3) -> RoomObject:
-    """A ready object whose base has its middle at `foot_m`. Raises SettingError for an unknown kind."""
+def ready_object(kind: str, name: str, foot_m: Vector3, size_m: Vector3 | None = None) -> RoomObject:
+    """A ready object whose foot has its middle at `foot_m`; `size_m` replaces its own size.
+
+    Raises SettingError for an unknown kind, and for a box without a size.
+    """
     if kind not in READY:
         raise SettingError(f"There is no ready object {kind!r}; expected one of {', '.join(READY)}.")
     ready, (x, y, z) = READY[kind], foot_m
-    sx, sy, sz = ready.size_m
+    size_m = size_m or ready.size_m
+    if size_m is None:
+        raise SettingError(f"{name!r} has no size; give its extent along x, y and z in metres.")
+    sx, sy, sz = size_m
     return RoomObject(
         name=name,
         lower_m=(x - sx / 2, y - sy / 2, z),

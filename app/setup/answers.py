@@ -10,7 +10,20 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from app.files.toml import Strict
-from app.setup.units import Angle, Difference, Distance, Flow, Length, Share, Size, Speed, Temperature, Time
+from app.setup.units import (
+    Angle,
+    Difference,
+    Distance,
+    Flow,
+    Length,
+    Power,
+    PowerDeviation,
+    Share,
+    Size,
+    Speed,
+    Temperature,
+    Time,
+)
 from core.geometry import WallName
 
 # At most so many things of one kind are in a room.
@@ -153,6 +166,36 @@ class WallAnswer(Strict):
         return self
 
 
+class ObjectAnswer(Strict):
+    """What stands in the room: a ready one by its kind, or a `box` of its own size.
+
+    It is described by the heat that it gives to the air, or by its surface's temperature.
+    """
+
+    kind: Literal["box", "seated_person", "standing_person", "desk", "cabinet", "screen", "radiator"]
+    """A kind has a usual size and heat (`core/objects.py` has their sources); a box has what is told here."""
+    position: tuple[Length, Length, Length]
+    """The middle of its foot, from the room's corner: x, y, z."""
+    size: tuple[Distance, Distance, Distance] | None = None
+    """Along x, y and z; that of its kind unless given."""
+    heat: Power | None = None
+    """What it gives to the air by convection; that of its kind unless given."""
+    heat_deviation: PowerDeviation | None = None
+    """Standard deviation of it; that of its kind unless given."""
+    temperature: Temperature | None = None
+    """Of its surface, instead of its heat."""
+    temperature_deviation: Difference = 0.5
+    """Standard deviation of it."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> "ObjectAnswer":
+        if self.kind == "box" and self.size is None:
+            raise ValueError("a box has a size; give it, or a kind that has one")
+        if self.heat is not None and self.temperature is not None:
+            raise ValueError("give heat or temperature, and not both")
+        return self
+
+
 class ThermometerAnswer(Strict):
     """A thermometer in the room's air."""
 
@@ -198,6 +241,8 @@ class Answers(Strict):
     """Warm and cold surfaces."""
     wall: tuple[WallAnswer, ...] = Field(default=(), max_length=MANY)
     """Walls of which something is known."""
+    object: tuple[ObjectAnswer, ...] = Field(default=(), max_length=MANY)
+    """People and furniture."""
     thermometer: tuple[ThermometerAnswer, ...] = Field(default=(), max_length=MANY)
     """Thermometers in the air."""
     anemometer: tuple[AnemometerAnswer, ...] = Field(default=(), max_length=MANY)

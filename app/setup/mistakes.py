@@ -16,6 +16,7 @@ from app.setup.answers import (
     AnemometerAnswer,
     Answers,
     CameraAnswer,
+    ObjectAnswer,
     Opening,
     OutletAnswer,
     ProjectorAnswer,
@@ -26,6 +27,7 @@ from app.setup.answers import (
 )
 from app.setup.units import Size
 from core.geometry import Vector3, face_of
+from core.objects import ready_object, shared_m
 
 # Faster than any supply of a room.
 FASTEST_M_S = 50.0
@@ -39,6 +41,7 @@ _LISTS: dict[str, Any] = {
     "outlet": OutletAnswer,
     "surface": SurfaceAnswer,
     "wall": WallAnswer,
+    "object": ObjectAnswer,
     "thermometer": ThermometerAnswer,
     "anemometer": AnemometerAnswer,
 }
@@ -94,6 +97,7 @@ def _contradictions(parts: Parts) -> list[Said]:
         _too_fast,
         _behind_the_wall,
         _outside_the_room,
+        _objects_apart,
         _wall_twice,
     )
     return [said for check in checks for said in check(parts)]
@@ -203,6 +207,27 @@ def _outside_the_room(parts: Parts) -> Iterator[Said]:
                     f"{place_m:g} m along {'xyz'[axis]} is outside the room, which is 0 to {length_m:g} m there."
                     f"{_millimetres(place_m, length_m)} Places are measured from the room's corner.",
                 )
+
+
+def _objects_apart(parts: Parts) -> Iterator[Said]:
+    """Objects that reach through a wall, or into one another."""
+    room_m: Vector3 | None = parts.get(("room",))
+    boxes = [
+        (path, ready_object(item.kind, item.kind, item.position, item.size))
+        for path, item in _named(parts, "object")
+    ]
+    for path, box in boxes if room_m else ():
+        for axis, length_m in enumerate(room_m or ()):
+            low_m, high_m = box.lower_m[axis], box.upper_m[axis]
+            if low_m < -1e-9 or high_m > length_m + 1e-9:
+                yield Said(
+                    (*path, "position", axis),
+                    f"it reaches from {low_m:g} to {high_m:g} m along {'xyz'[axis]}; the room is 0 to {length_m:g} m "
+                    f"there.{_millimetres(high_m, length_m)} `position` is the middle of its foot.",
+                )
+    for (path, one), (later, other) in combinations(boxes, 2):
+        if min(shared_m(one, other)) > 1e-9:
+            yield Said(later, f"it stands in {path[0]} {int(path[1]) + 1}. Move one of them.")
 
 
 def _wall_twice(parts: Parts) -> Iterator[Said]:

@@ -94,6 +94,16 @@ speed = "0.28 m/s"
 [[wall]]
 wall = "z_min"
 adiabatic = true
+[[object]]
+kind = "box"
+position = ["2.5 m", "1.5 m", "0 m"]
+size = ["0.6 m", "0.4 m", "0.5 m"]
+heat = "40 W"
+heat_deviation = "10 W"
+[[object]]
+kind = "cabinet"
+position = ["1 m", "1.5 m", "0 m"]
+temperature = "24 C"
 [[anemometer]]
 position = ["2 m", "1.5 m", "1.1 m"]
 velocity = ["0.1 m/s", "0 m/s", "0 m/s"]

@@ -1,6 +1,7 @@
 """Answers to the scene and the rig that they describe. Raises BadInputError with the answer's name."""
 
 import math
+from dataclasses import replace
 
 from app.errors import BadInputError
 from app.experiment.folder import ExperimentSettings
@@ -11,11 +12,12 @@ from app.experiment.rig_settings import (
     SimulatedCameraSettings,
     V4l2CameraSettings,
 )
-from app.setup.answers import Answers, CameraAnswer, Opening, SupplyAnswer
+from app.setup.answers import Answers, CameraAnswer, ObjectAnswer, Opening, SupplyAnswer
 from app.setup.mistakes import contradictions, field_name
 from app.volume.scene import projected
 from core.air import Air
 from core.geometry import WALLS, Box, Optics, Vector3, face_of, looking_along_y
+from core.objects import RoomObject, ready_object
 from core.plan.print_choice import suited_print
 from core.scene import (
     BoundaryInformation,
@@ -57,6 +59,7 @@ def settings_of(answers: Answers, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> Experi
             ),
             light=_light(answers, optics, room),
             boundary=tuple(_boundary(answers, room)),
+            objects=tuple(object_of(item, n, room.lower_m) for n, item in enumerate(answers.object)),
         )
     except SettingError as error:
         raise BadInputError(str(error)) from error
@@ -188,6 +191,25 @@ def _walls(answers: Answers) -> list[Wall]:
         for item in answers.wall
     }
     return [told.get(name, Wall(wall=name)) for name in WALLS]
+
+
+def object_of(item: ObjectAnswer, number: int, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> RoomObject:
+    """The box of one answer; `number` is its place among the answers. Raises SettingError."""
+    name, foot_m = f"{item.kind.replace('_', ' ')} {number + 1}", _moved(item.position, corner_m)
+    ready = ready_object(item.kind, name, foot_m, item.size)
+    if item.temperature is not None:
+        return replace(
+            ready,
+            thermal="temperature",
+            power_w=None,
+            temperature_k=item.temperature,
+            temperature_std_k=item.temperature_deviation,
+        )
+    power_w = ready.power_w if item.heat is None else item.heat
+    if power_w is None:
+        return ready
+    std_w = ready.power_std_w if item.heat_deviation is None else item.heat_deviation
+    return replace(ready, thermal="power", power_w=power_w, power_std_w=std_w)
 
 
 def _inlet(item: SupplyAnswer, room: Box) -> Inlet:

@@ -30,6 +30,7 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "time": {"s": (1.0, 0.0), "ms": (1e-3, 0.0)},
     "angle": {"deg": (1.0, 0.0)},
     "share": {"%": (1e-2, 0.0)},
+    "power": {"W": (1.0, 0.0), "kW": (1e3, 0.0)},
 }
 _EXAMPLES = {
     "length": "2.7 m",
@@ -40,6 +41,7 @@ _EXAMPLES = {
     "time": "20 ms",
     "angle": "60 deg",
     "share": "5 %",
+    "power": "75 W",
 }
 _WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*")
 # Temperatures of air, walls and heaters in a room.
@@ -143,3 +145,5 @@ Speed = Annotated[
 Time = Annotated[float, Written("time", 1e-6, 60.0, "It lies between 0.001 ms and 60 s.")]
 Angle = Annotated[float, Written("angle", 1.0, 170.0, "A lens sees 1 to 170 degrees.")]
 Share = Annotated[float, Written("share", 1e-4, 1.0, "It is 0.01 to 100 %.")]
+Power = Annotated[float, Written("power", -1e5, 1e5, "A person gives 75 W: is the unit right?")]
+PowerDeviation = Annotated[float, Written("power", 0.1, 1e5, "A deviation is 0.1 W to 100 kW.")]

@@ -17,6 +17,7 @@ from app.setup.mistakes import mistakes_in
 
 GONE = object()
 BESIDE = [{"wall": "x_min", "lower": ["1.5 m", "2.4 m"], "upper": ["2 m", "2.6 m"], "temperature": "40 C"}]
+PERSON = {"kind": "seated_person", "position": ["2 m", "1 m", "0 m"]}
 METER = {"position": ["2 m", "1 m", "1 m"], "velocity": ["0.1 m/s", "0 m/s", "0 m/s"]}
 PROJECTOR = {
     "position": ["3 m", "-1 m", "1 m"],
@@ -73,6 +74,18 @@ WRONG: list[tuple[Keys, Any, str, str]] = [
         "projector.position[1]",
         r"at or behind",
     ),
+    # Objects.
+    (("object",), [PERSON | {"kind": "piano"}], "object[0].kind", r"'box', 'seated_person'"),
+    (("object",), [PERSON | {"kind": "box"}], "object[0]", r"a box has a size"),
+    (("object",), [PERSON | {"heat": "75"}], "object[0].heat", r"has no unit.*W, kW"),
+    (("object",), [PERSON | {"heat": "75 W", "temperature": "30 C"}], "object[0]", r"heat or temperature"),
+    (
+        ("object",),
+        [PERSON | {"position": ["0.1 m", "1 m", "0 m"]}],
+        "object[0].position[0]",
+        r"reaches from -0.1 to 0.3 m along x; the room is 0 to",
+    ),
+    (("object",), [PERSON, PERSON], "object[1]", r"it stands in object 1"),
     # What contradicts itself.
     (("outlet",), GONE, "supply", r"1 supplies and 0 outlets: air that comes in must leave"),
     (("supply",), GONE, "outlet", r"0 supplies and 1 outlets"),
