@@ -7,7 +7,7 @@ that of the work: what `airlens` alone lists.
 COMMANDS = {
     "demo": (
         "app.commands.demo",
-        "The whole chain on a packaged room: simulate a rig, capture, reconstruct, report.",
+        "The whole chain on a packaged room: simulate a lab's rig, capture, reconstruct, report.",
     ),
     "new": (
         "app.commands.new",
@@ -55,7 +55,7 @@ COMMANDS = {
     ),
     "report": (
         "app.commands.report",
-        "Write the report of a result: one HTML file that needs no network.",
+        "Write the report of a result: one HTML file that needs no network, or two pages of PDF.",
     ),
     "export": (
         "app.commands.report",

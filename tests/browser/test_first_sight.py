@@ -8,6 +8,8 @@ from app.client import Client
 from tests.browser.conftest import Opens, Station, snapshot
 
 MOST = 6
+# A whole `standard`, beside another test on the other core.
+SOLVED_WITHIN_S = 400.0
 
 
 def test_an_empty_service_says_what_it_does_and_has_three_doors(station: Station, opens: Opens):
@@ -30,10 +32,10 @@ def test_six_clicks_lead_from_nothing_to_the_moving_room(station: Station, opens
     page = opens(station.address).page
     clicks = 0
 
-    def click(words: str) -> None:
+    def click(words: str, within_s: float = 100.0) -> None:
         nonlocal clicks
         button = page.locator("button.next") if clicks else page.locator(".door").first
-        expect(button).to_contain_text(re.compile(words))
+        expect(button).to_contain_text(re.compile(words), timeout=1e3 * within_s)
         expect(button).to_be_enabled()
         button.click()
         clicks += 1
@@ -48,7 +50,7 @@ def test_six_clicks_lead_from_nothing_to_the_moving_room(station: Station, opens
     click("Take the reference")
     click("Take the flow")
     click("^Reconstruct$")
-    click("Look")
+    click("Look", within_s=SOLVED_WITHIN_S)
     place = page.locator(".volume > div")
     expect(place).to_have_attribute("data-frame-ms", re.compile(r"\d"))
     page.emulate_media(reduced_motion="no-preference")

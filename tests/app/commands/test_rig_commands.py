@@ -22,7 +22,7 @@ def run(*words):
 
 def test_devices_are_listed_as_json_and_in_words():
     found = json.loads(run("devices", "--json").stdout)
-    assert set(found) == {"cameras", "serial_ports"}
+    assert set(found) == {"cameras", "vision_cameras", "serial_ports"}
     assert run("devices").stdout
 
 
