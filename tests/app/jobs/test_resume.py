@@ -1,6 +1,5 @@
 """Killed in the middle and started again: the end is bitwise the same. Real processes, the preset `grid`."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -19,19 +18,16 @@ ROOT = Path(__file__).parents[3]
 class Attempts:
     """One job, run by a new process each time."""
 
-    def __init__(self, folder: Path, experiment: Path, cache: Path) -> None:
+    def __init__(self, folder: Path, experiment: Path) -> None:
         ledger = Ledger(folder)
         job = ledger.submit(JobSpec(kind="reconstruct", experiment=experiment, settings={"preset": "grid"}))
         self.folder, self.number = JobFolder(ledger.folder_of(job.id)), 0
-        # What one process compiled the next ones need not.
-        own = {"JAX_COMPILATION_CACHE_DIR": str(cache), "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}
-        self._environment = {**os.environ, **own}
 
     def begin(self) -> subprocess.Popen:
         self.number += 1
         self.folder.hand_over(Owner(self.number, f"attempt {self.number}"))
         command = [sys.executable, "-m", "app.worker", str(self.folder.path)]
-        return subprocess.Popen(command, cwd=ROOT, env=self._environment)
+        return subprocess.Popen(command, cwd=ROOT)
 
     def kept(self) -> list[Path]:
         return sorted(self.folder.attempt(self.number).glob("checkpoint/[0-9]*.checkpoint"))
@@ -48,7 +44,7 @@ class Attempts:
 
 
 def test_kill_9_in_the_middle_and_again_ends_bitwise_the_same(experiment: Path, tmp_path: Path):
-    job = Attempts(tmp_path / "killed", experiment, tmp_path / "cache")
+    job = Attempts(tmp_path / "killed", experiment)
     with job.begin() as process:
         job.wait_for_a_checkpoint(process)
         process.send_signal(signal.SIGKILL)
@@ -61,7 +57,7 @@ def test_kill_9_in_the_middle_and_again_ends_bitwise_the_same(experiment: Path, 
         process.wait(200)
     assert process.returncode == DONE
 
-    whole = Attempts(tmp_path / "whole", experiment, tmp_path / "cache")
+    whole = Attempts(tmp_path / "whole", experiment)
     with whole.begin() as process:
         process.wait(200)
     assert process.returncode == DONE
