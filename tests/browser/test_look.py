@@ -138,13 +138,13 @@ def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: 
     pictures = {"plane and streamlines": place.screenshot()}
     page.get_by_label("Streamlines").uncheck()
     pictures["plane"] = another(place, set(pictures.values()))
-    page.get_by_label("Plane across y").uncheck()
+    page.get_by_role("checkbox", name="Plane across y").uncheck()
     for mode in ("Isosurface", "Arrows", "Volume"):
         page.get_by_label(mode, exact=True).check()
         pictures[mode] = another(place, set(pictures.values()))
         snapshot(page, f"look-{mode.lower()}")
         page.get_by_label(mode, exact=True).uncheck()
-    page.get_by_label("Plane across y").check()
+    page.get_by_role("checkbox", name="Plane across y").check()
     page.get_by_role("button", name="Top", exact=True).click()
     another(place, set(pictures.values()))
     with page.expect_download() as download:
@@ -186,6 +186,7 @@ def test_an_object_is_grey_and_a_plane_is_dragged_by_its_grip(station: Station, 
     expect(page.locator(".volume > div")).to_have_attribute("data-frame-ms", PAINTED)
     slider = page.get_by_label("Plane at y")
     expect(slider.first).to_have_value("50")
+    page.evaluate("scrollTo(0, 0)")
     held = grip.bounding_box()
     page.mouse.move(held["x"] + 8, held["y"] + 8)
     page.mouse.down()
@@ -194,7 +195,7 @@ def test_an_object_is_grey_and_a_plane_is_dragged_by_its_grip(station: Station, 
     expect(slider.first).not_to_have_value("50")
     moved = grip.bounding_box()
     assert moved["x"] > held["x"] + 20
-    page.get_by_label("Plane across z").check()
+    page.get_by_role("checkbox", name="Plane across z").check()
     expect(page.locator(".grip:not([hidden])")).to_have_count(2)
     snapshot(page, "look-desk")
     assert watched.complaints == []

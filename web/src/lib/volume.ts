@@ -73,6 +73,8 @@ const TAIL_S = 3;
 const FRAME_MS = 40;
 // A way along which a plane is dragged is at least so long on the screen.
 const SHORTEST_PX = 12;
+// How far below the middle of the room one looks from the corner, in halves of its height.
+const LOWER = 0.2;
 const OPENINGS = {
   inlet: [0.45, 0.85, 1],
   outlet: [1, 0.75, 0.4],
@@ -251,9 +253,16 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     camera.setPosition(x + dx, y + dy, z + dz);
     camera.setViewUp(0, 0, 1);
     renderer.resetCamera();
+    if (from === "Corner") {
+      // The words of the axes stand below the room: one looks a little lower.
+      const lower = LOWER * (z - (shown?.axes.z[0] ?? 0));
+      camera.setFocalPoint(x, y, z - lower);
+      const [px, py, pz] = camera.getPosition();
+      camera.setPosition(px, py, pz - lower);
+    }
     // On a narrow screen the room's width is the limit.
     const isNarrow = place.clientWidth < 1.2 * place.clientHeight;
-    camera.zoom(isNarrow ? 0.85 : from === "Corner" ? 1.1 : 1.3);
+    camera.zoom(isNarrow ? 0.85 : from === "Corner" ? 1.08 : 1.3);
     renderer.resetCameraClippingRange();
     window3d.render();
     put();
