@@ -255,9 +255,10 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     renderer.resetCamera();
     if (from === "Corner") {
       // The words of the axes stand below the room: one looks a little lower.
-      const lower = LOWER * (z - (shown?.axes.z[0] ?? 0));
-      camera.setFocalPoint(x, y, z - lower);
-      const [px, py, pz] = camera.getPosition();
+      const heights = shown?.axes.z ?? [];
+      const lower = (LOWER * ((heights.at(-1) ?? 0) - (heights[0] ?? 0))) / 2;
+      const [[fx, fy, fz], [px, py, pz]] = [[...camera.getFocalPoint()] as Vector, [...camera.getPosition()] as Vector];
+      camera.setFocalPoint(fx, fy, fz - lower);
       camera.setPosition(px, py, pz - lower);
     }
     // On a narrow screen the room's width is the limit.
