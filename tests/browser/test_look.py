@@ -156,7 +156,7 @@ def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: 
             page.get_by_role("button", name=label, exact=True).click()
         assert Path(download.value.path()).read_bytes().startswith(start), label
     with page.context.expect_page() as opened:
-        page.get_by_role("button", name="Report").click()
+        page.get_by_role("button", name="Report", exact=True).click()
     expect(opened.value.get_by_role("heading")).to_have_text("Report")
     assert watched.complaints == []
 
