@@ -145,7 +145,7 @@ def plans_figure(plans: Sequence[Plan]) -> Figure:
         axis.set_title(plan.title)
         axis.set_xlabel("x [m]")
         axis.set_ylabel("y [m]")
-        figure.colorbar(drawn, ax=axis, label=plan.label, shrink=0.85)
+        figure.colorbar(drawn, ax=axis, label=plan.label, shrink=0.6)
     return figure
 
 

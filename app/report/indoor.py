@@ -80,8 +80,8 @@ class Indoor:
 
 # Key: name and unit.
 NAMES: Mapping[str, tuple[str, str]] = {
-    "temperature_mean": ("temperature, mean", "C"),
-    "temperature_p95": ("temperature, 95th percentile", "C"),
+    "temperature_mean": ("temperature, mean", "°C"),
+    "temperature_p95": ("temperature, 95th percentile", "°C"),
     "head_to_ankle": ("head (1.1 m) minus ankle (0.1 m), mean", "K"),
     "head_to_ankle_p95": ("head minus ankle, 95th percentile", "K"),
     "floor_to_ceiling": ("ceiling minus floor, whole room", "K"),
@@ -99,8 +99,8 @@ NAMES: Mapping[str, tuple[str, str]] = {
     "efficiency": ("air change efficiency", "%"),
     "zone_index": ("air change index of the occupied zone", ""),
     "source_effectiveness": ("removal of the source's air (1: mixed)", ""),
-    "supply_temperature": ("supply air, temperature", "C"),
-    "exhaust_temperature": ("exhaust air, temperature", "C"),
+    "supply_temperature": ("supply air, temperature", "°C"),
+    "exhaust_temperature": ("exhaust air, temperature", "°C"),
     "heat": ("heat that the supply air brings", "W"),
 }
 _BY_AGE = ("mean_age", "efficiency", "zone_index", "source_effectiveness")

@@ -1,13 +1,14 @@
 """Takes a picture of every page, in light and dark, at three sizes, for somebody to look at.
 
     python -m tests.browser.gallery FOLDER [--plan]
-    python -m tests.browser.gallery --readme web/page.png
+    python -m tests.browser.gallery --readme web/page.png --experiment airlens-data/experiments/demo
 
 A simulated rig lit by its projector, calibrated, with captures, two results, a job and (--plan) a plan. For the
-README: Look alone, at the packaged room with some noise.
+README: Look alone, at the newest result of an experiment, such as the demo's.
 """
 
 import argparse
+import shutil
 import tempfile
 import time
 from pathlib import Path
@@ -46,15 +47,19 @@ def furnish(station: Station, planned: bool) -> None:
         keep(experiment, "20260102T000000-draft", room(), "draft", 3.0)
 
 
-def shoot_for_readme(browser: Browser, station: Station, picture: Path) -> None:
-    """The page Look of one result."""
-    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=300) as client:
-        made = client.create_experiment("Room with a warm jet", camera_px=64).experiment
-    keep(station.app.state.services.folders.open(made), "20260101T000000-standard", room(), "standard", 1.0)
-    page = browser.new_page(viewport={"width": 1280, "height": 860}, color_scheme="light", bypass_csp=True)
+def shoot_for_readme(browser: Browser, station: Station, experiment: Path, picture: Path) -> None:
+    """The page Look at an experiment's newest result, while the air moves."""
+    shutil.copytree(experiment, station.app.state.services.folders.root / experiment.name)
+    page = browser.new_page(
+        viewport={"width": 1280, "height": 900},
+        color_scheme="light",
+        bypass_csp=True,
+        reduced_motion="no-preference",
+    )
     page.goto(station.address)
     page.locator("nav").get_by_role("button", name="Look").click()
     expect(page.locator("main")).to_have_attribute("aria-label", "Look")
+    expect(page.locator(".volume > div")).to_have_attribute("data-moved", PAINTED)
     expect(page.locator(".slice canvas").first).to_have_attribute("data-painted", PAINTED)
     page.wait_for_timeout(10_000)
     page.screenshot(path=str(picture))
@@ -65,7 +70,9 @@ def shoot(page: Page, folder: Path, name: str) -> None:
     page.goto(page.url.split("#")[0] + "#/new")
     page.get_by_role("radio", name="packaged room").check()
     expect(page.locator("button.next")).to_have_text("Create the experiment")
+    page.add_style_tag(content="header, footer { position: static !important }")
     page.screenshot(path=str(folder / f"0-New-{name}.png"), full_page=True)
+    page.evaluate("document.head.lastElementChild.remove()")
     for number, title in enumerate(PAGES, 1):
         page.locator("nav").get_by_role("button", name=title).click()
         expect(page.locator("main")).to_have_attribute("aria-label", title)
@@ -98,15 +105,18 @@ def main() -> None:
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--plan", action="store_true")
     parser.add_argument("--readme", type=Path, help="only the picture of README, to this file")
+    parser.add_argument("--experiment", type=Path, help="with --readme: whose newest result is shown")
     options = parser.parse_args()
     if options.folder is None and options.readme is None:
         parser.error("give a folder, or --readme with a file")
+    if options.readme is not None and options.experiment is None:
+        parser.error("--readme shows a result: give --experiment with a solved experiment's folder")
     with tempfile.TemporaryDirectory() as data, sync_playwright() as playwright:
         station = Station(Path(data))
         station.start()
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         if options.readme is not None:
-            shoot_for_readme(browser, station, options.readme)
+            shoot_for_readme(browser, station, options.experiment, options.readme)
         else:
             furnish(station, options.plan)
             shoot_all(browser, station, options.folder)

@@ -28,6 +28,18 @@ def test_an_empty_service_says_what_it_does_and_has_three_doors(station: Station
     assert watched.complaints == []
 
 
+def test_the_door_to_pictures_leads_to_where_they_are_dropped(station: Station, opens: Opens):
+    watched = opens(station.address)
+    page = watched.page
+    page.locator(".door", has_text="Open pictures").click()
+    expect(page.get_by_role("radio", name=re.compile("whose pictures I bring"))).to_be_checked()
+    expect(page.locator("button.next")).to_have_text("Create the experiment")
+    page.locator("button.next").click()
+    expect(page.locator("main")).to_have_attribute("aria-label", "Capture")
+    expect(page.get_by_label("Reference: still air").last).to_be_visible()
+    assert watched.complaints == []
+
+
 def test_six_clicks_lead_from_nothing_to_the_moving_room(station: Station, opens: Opens):
     page = opens(station.address).page
     clicks = 0

@@ -15,6 +15,7 @@ from app.files.durable import write_json, write_text
 from app.files.toml import to_plain
 from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.file import read_volume
+from core.objects import RoomObject
 from core.result import Outcome, Solution
 from tests.browser.conftest import Opens, Station, snapshot
 
@@ -43,8 +44,20 @@ def room() -> Solution:
     )
 
 
-def keep(experiment: Experiment, name: str, solution: Solution, preset: str, loss: float) -> None:
+DESK = RoomObject(name="desk", lower_m=(0.5, -0.75, 0.0), upper_m=(2.0, 0.75, 0.8))
+
+
+def keep(
+    experiment: Experiment,
+    name: str,
+    solution: Solution,
+    preset: str,
+    loss: float,
+    objects: tuple[RoomObject, ...] = (),
+) -> None:
+    """Keep a result; `objects` stand in its room, and no air is in them."""
     folder = experiment.results_folder / name
+    solution = solution.without_objects(objects)
     folder.mkdir(parents=True)
     write_result(folder / "result.nc", solution, {})
     write_text(
@@ -58,6 +71,7 @@ def keep(experiment: Experiment, name: str, solution: Solution, preset: str, los
         "created": "2026-01-01T00:00:00+00:00",
         "settings": to_plain(experiment.settings),
     }
+    settings["settings"]["scene"]["objects"] = [to_plain(one) for one in objects]
     write_manifest(folder, settings)
 
 
@@ -124,13 +138,13 @@ def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: 
     pictures = {"plane and streamlines": place.screenshot()}
     page.get_by_label("Streamlines").uncheck()
     pictures["plane"] = another(place, set(pictures.values()))
-    page.get_by_label("Plane", exact=True).uncheck()
+    page.get_by_role("checkbox", name="Plane across y").uncheck()
     for mode in ("Isosurface", "Arrows", "Volume"):
         page.get_by_label(mode, exact=True).check()
         pictures[mode] = another(place, set(pictures.values()))
         snapshot(page, f"look-{mode.lower()}")
         page.get_by_label(mode, exact=True).uncheck()
-    page.get_by_label("Plane", exact=True).check()
+    page.get_by_role("checkbox", name="Plane across y").check()
     page.get_by_role("button", name="Top", exact=True).click()
     another(place, set(pictures.values()))
     with page.expect_download() as download:
@@ -144,6 +158,46 @@ def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: 
     with page.context.expect_page() as opened:
         page.get_by_role("button", name="Report", exact=True).click()
     expect(opened.value.get_by_role("heading")).to_have_text("Report")
+    assert watched.complaints == []
+
+
+def test_an_object_is_grey_and_a_plane_is_dragged_by_its_grip(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=64).experiment
+    experiment = station.app.state.services.folders.open(name)
+    keep(experiment, "20260101T000000-standard", room(), "standard", 1.0, (DESK,))
+    watched = opens(station.address)
+    page = watched.page
+    expect(page.locator(".bar").first).to_contain_text("grey: people and furniture")
+    slices = page.locator(".slice canvas")
+    expect(slices.first).to_have_attribute("data-painted", PAINTED)
+    # The middle of the desk in the plane across y, and air above it.
+    colours = slices.first.evaluate(
+        """canvas => [0.9, 0.4].map(down => [...canvas.getContext("2d").getImageData(
+             canvas.width * 0.5, canvas.height * down, 1, 1).data].slice(0, 3))"""
+    )
+    assert colours[0] == [128, 130, 134], colours
+    assert colours[1] != colours[0]
+    box = slices.first.bounding_box()
+    slices.first.hover(position={"x": 0.5 * box["width"], "y": 0.9 * box["height"]})
+    expect(page.locator(".slice .probe").first).to_contain_text("an object, no air")
+
+    grip = page.locator(".grip[title='Drag the plane along y']")
+    expect(page.locator(".volume > div")).to_have_attribute("data-frame-ms", PAINTED)
+    slider = page.get_by_label("Plane at y")
+    expect(slider.first).to_have_value("50")
+    page.evaluate("scrollTo(0, 0)")
+    held = grip.bounding_box()
+    page.mouse.move(held["x"] + 8, held["y"] + 8)
+    page.mouse.down()
+    page.mouse.move(held["x"] + 68, held["y"] - 12, steps=3)
+    page.mouse.up()
+    expect(slider.first).not_to_have_value("50")
+    moved = grip.bounding_box()
+    assert moved["x"] > held["x"] + 20
+    page.get_by_role("checkbox", name="Plane across z").check()
+    expect(page.locator(".grip:not([hidden])")).to_have_count(2)
+    snapshot(page, "look-desk")
     assert watched.complaints == []
 
 

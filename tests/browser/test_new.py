@@ -177,6 +177,32 @@ def test_a_mistake_is_told_at_its_field_while_it_is_typed_and_can_be_undone(stat
     expect(field).to_have_value("3 m")
 
 
+def test_a_person_comes_into_the_room_by_keyboard_alone(station: Station, opens: Opens):
+    page = opens(station.address).page
+
+    def press(place: Locator, key: str = "Enter") -> None:
+        expect(place).to_be_visible()
+        for _ in range(150):
+            if place.evaluate("element => element === document.activeElement"):
+                break
+            page.keyboard.press("Tab")
+        page.keyboard.press(key)
+
+    press(page.locator(".door").nth(1))
+    press(page.get_by_role("radio", name=re.compile("packaged room")), "Space")
+    expect(page.locator("button.next")).to_have_text("Create the experiment")
+    press(page.get_by_role("button", name="Add object", exact=True))
+    person = page.get_by_role("group", name="object 1").first
+    height = person.get_by_label("z").first
+    expect(height).to_be_visible()
+    page.keyboard.press("Shift+Tab")
+    assert person.evaluate("element => element.contains(document.activeElement)")
+    press(page.locator("button.next"))
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+    settings = (station.app.state.services.folders.all()[0] / "experiment.toml").read_text()
+    assert "[[scene.objects]]" in settings
+
+
 def test_an_opening_is_moved_by_keys_and_by_pointer_and_the_draft_survives_a_reload(
     station: Station, opens: Opens
 ):

@@ -11,10 +11,12 @@ from playwright.sync_api import Page, expect
 from drivers.simulated import CameraFault, SimulatedCamera
 from tests.app.rig.test_live_camera import SCENE
 from tests.browser.conftest import PAGE, Opens, Station, snapshot
+from tests.browser.test_look import DESK, keep, room
 
 ROOT = PAGE.parents[1]
 AXE = ROOT / "node_modules" / "axe-core" / "axe.min.js"
-PAGES = ["Rig", "Calibrate", "Plan", "Capture", "Reconstruct", "Look"]
+PAGES = ["Rig", "Calibrate", "Plan", "Capture", "Reconstruct", "Look", "Room", "New"]
+THINGS = ("supply", "outlet", "surface", "wall", "object", "thermometer", "anemometer")
 
 
 def packed_bytes(*patterns: str) -> int:
@@ -29,15 +31,44 @@ def test_the_first_load_and_the_lazy_chunk_stay_small():
 
 
 def go(page: Page, name: str) -> None:
-    """Open a page; a new experiment is begun with the simulated camera, so that the whole of it is there."""
-    if name == "New":
+    """Open a page, with all that it has: everything that a room may hold, a projector, a board, the import."""
+    if name == "Room":
+        page.get_by_role("button", name="Rig", exact=True).first.click()
+        page.get_by_role("button", name="Edit room", exact=True).click()
+        expect(page.locator("button.next")).to_have_text("Change the room")
+    elif name == "New":
         page.get_by_role("button", name="Rig", exact=True).first.click()
         page.get_by_role("button", name="New experiment", exact=True).click()
         page.get_by_role("radio", name=re.compile("Simulated camera")).check()
         expect(page.locator("button.next")).to_have_text("Create the experiment")
+        for thing in THINGS:
+            page.get_by_role("button", name=f"Add {thing}", exact=True).click()
+        page.get_by_role("radio", name=re.compile("A projector")).check()
+        expect(page.get_by_role("group", name="object 1").first).to_be_visible()
     else:
         page.get_by_role("button", name=name, exact=True).first.click()
+    if name == "Rig":
+        page.get_by_role("combobox", name="Paper").select_option("a0")
+        page.get_by_role("button", name="Make a board").click()
+        expect(page.get_by_role("link", name="Board (PDF)")).to_be_visible()
+    elif name == "Capture":
+        page.locator("details.import").evaluate("details => (details.open = true)")
+    elif name == "Look":
+        expect(page.locator(".volume > div")).to_have_attribute("data-frame-ms", re.compile(r"\d"))
     expect(page.locator("main")).to_have_attribute("aria-label", name)
+
+
+def begin(station: Station, page: Page) -> None:
+    """The packaged room by its answers, with a result in whose room a desk stands."""
+    page.locator(".door", has_text="New experiment").click()
+    page.get_by_role("radio", name=re.compile("packaged room")).check()
+    expect(page.locator("button.next")).to_have_text("Create the experiment")
+    page.locator("button.next").click()
+    expect(page.locator("button.next")).to_have_text("Calibrate")
+    folders = station.app.state.services.folders
+    keep(folders.open(folders.all()[0].name), "20260101T000000-standard", room(), "standard", 1.0, (DESK,))
+    page.reload()
+    expect(page.locator("footer")).to_contain_text("service connected")
 
 
 @pytest.mark.skipif(not AXE.is_file(), reason="axe-core is not installed; run `python web/hatch_build.py`")
@@ -46,10 +77,9 @@ def test_axe_finds_nothing_on_any_page(station: Station, opens: Opens, theme: st
     # axe is run from outside the policy; the page itself is watched under it in every other test.
     watched = opens(station.address, color_scheme=theme, bypass_csp=True)
     page = watched.page
-    page.locator("button.next").click()
-    expect(page.locator("button.next")).to_have_text("Calibrate")
+    begin(station, page)
     page.evaluate(AXE.read_text(encoding="utf-8"))
-    for name in [*PAGES, "New"]:
+    for name in PAGES:
         go(page, name)
         found = page.evaluate(
             "async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])"
@@ -58,15 +88,16 @@ def test_axe_finds_nothing_on_any_page(station: Station, opens: Opens, theme: st
         snapshot(page, f"axe-{theme}-{name}")
 
 
-def test_every_page_fits_a_screen_of_1024_by_768(station: Station, opens: Opens):
+@pytest.mark.parametrize("narrow_px", [1024, 390])
+def test_every_page_fits_a_narrow_screen(station: Station, opens: Opens, narrow_px: int):
     page = opens(station.address, viewport={"width": 1024, "height": 768}, color_scheme="dark").page
-    page.locator("button.next").click()
-    expect(page.locator("button.next")).to_have_text("Calibrate")
-    for name in [*PAGES, "New"]:
+    begin(station, page)
+    page.set_viewport_size({"width": narrow_px, "height": 768})
+    for name in PAGES:
         go(page, name)
-        assert page.evaluate("document.documentElement.scrollWidth") <= 1024, name
+        assert page.evaluate("document.documentElement.scrollWidth") <= narrow_px, name
         assert page.locator("header").bounding_box()["height"] < 120, name
-        snapshot(page, f"1024-{name}")
+        snapshot(page, f"{narrow_px}-{name}")
 
 
 def test_a_page_without_a_token_says_how_to_get_one(station: Station, opens: Opens):

@@ -31,7 +31,8 @@ from app.files.reading import reading
 
 router = APIRouter(tags=["results"])
 NUMBERS = body(
-    "application/octet-stream", "Little-endian numbers in C order; value = X-Offset + X-Scale * number."
+    "application/octet-stream",
+    "Little-endian numbers in C order; value = X-Offset + X-Scale * number. X-Missing stands for no air.",
 )
 FILE = body("application/octet-stream", "A file to keep.")
 PAGE = body("text/html", "A page in one file.", text=True)

@@ -18,16 +18,18 @@ from core.result import Derived, Solution
 Encoding = Literal["u16", "f16", "f32"]
 Axis = Literal["x", "y", "z"]
 KEPT = 4
+_LARGEST = 65535
 
 
 @dataclass(frozen=True)
 class Packed:
-    """Little-endian numbers; the value is `offset + scale * number`."""
+    """Little-endian numbers; the value is `offset + scale * number`, and `missing` stands for no value."""
 
     content: bytes
     shape: tuple[int, ...]
     offset: float
     scale: float
+    missing: int | None = None
 
     @property
     def headers(self) -> dict[str, str]:
@@ -36,7 +38,7 @@ class Packed:
             "X-Shape": ",".join(map(str, self.shape)),
             "X-Offset": repr(self.offset),
             "X-Scale": repr(self.scale),
-        }
+        } | ({} if self.missing is None else {"X-Missing": str(self.missing)})
 
 
 @dataclass(frozen=True)
@@ -163,13 +165,18 @@ def cut(values: Float32[np.ndarray, "nx ny nz"], axis: Axis, index: int) -> Floa
 
 
 def pack(values: Float32[np.ndarray, "*shape"], encoding: Encoding) -> Packed:
-    """Return numbers for the wire: u16 resolves 1/65535 of the range, f16 about 1/2000 of the largest."""
+    """Return numbers for the wire: u16 resolves 1/65535 of the range, f16 about 1/2000 of the largest.
+
+    Where there is no air there is no value: NaN in floats, the largest number in u16.
+    """
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     if encoding == "f32":
         return Packed(values.astype("<f4").tobytes(), values.shape, 0.0, 1.0)
     if encoding == "f16":
         middle = (low + high) / 2
         return Packed((values - middle).astype("<f2").tobytes(), values.shape, middle, 1.0)
-    scale = (high - low) / 65535 or 1.0
-    numbers = np.rint((np.nan_to_num(values, nan=low) - low) / scale)
-    return Packed(numbers.astype("<u2").tobytes(), values.shape, low, scale)
+    empty = np.isnan(values)
+    missing = _LARGEST if empty.any() else None
+    scale = (high - low) / (_LARGEST if missing is None else _LARGEST - 1) or 1.0
+    numbers = np.where(empty, _LARGEST, np.rint((values - low) / scale))
+    return Packed(numbers.astype("<u2").tobytes(), values.shape, low, scale, missing)

@@ -75,7 +75,7 @@ export interface Numbers {
   shape: number[];
 }
 
-/** Reads scaled 16-bit (or plain 32-bit) numbers into floats. */
+/** Reads scaled 16-bit (or plain 32-bit) numbers into floats; NaN where there is no air. */
 export async function numbers<R extends Request>(request: R, given: Given<R>): Promise<Numbers> {
   const answer = await reach("GET", address(request, given));
   const offset = Number(answer.headers.get("X-Offset"));
@@ -84,8 +84,12 @@ export async function numbers<R extends Request>(request: R, given: Given<R>): P
   const raw = await answer.arrayBuffer();
   if (raw.byteLength === 4 * shape.reduce((n, m) => n * m, 1)) return { values: new Float32Array(raw), shape };
   const packed = new Uint16Array(raw);
+  const missing = Number(answer.headers.get("X-Missing") ?? NaN);
   const values = new Float32Array(packed.length);
-  for (let i = 0; i < packed.length; i++) values[i] = offset + scale * (packed[i] ?? 0);
+  for (let i = 0; i < packed.length; i++) {
+    const number = packed[i] ?? 0;
+    values[i] = number === missing ? NaN : offset + scale * number;
+  }
   return { values, shape };
 }
 

@@ -59,6 +59,9 @@ class Bench {
   /** Grows with everything that is told of a guided calibration. */
   guided = $state(0);
 
+  /** Whether the new experiment is for pictures that another camera took. */
+  importing = $state(false);
+
   /** The next step of a page that has its own. */
   offered = $state.raw<Step | null>(null);
 

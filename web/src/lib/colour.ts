@@ -86,7 +86,10 @@ export function table(kind: Scale["kind"]): Uint8ClampedArray {
   return colours;
 }
 
-/** Paints a plane: the first index to the right, the second upwards. */
+/** What is no air: people and furniture. */
+export const SOLID: Stop = [128, 130, 134];
+
+/** Paints a plane: the first index to the right, the second upwards. Where there is no air it is grey. */
 export function paint(values: Float32Array, shape: number[], scale: Scale): ImageData {
   const [across, up] = [shape[0] ?? 1, shape[1] ?? 1];
   const colours = table(scale.kind);
@@ -94,12 +97,10 @@ export function paint(values: Float32Array, shape: number[], scale: Scale): Imag
   const factor = 255 / (scale.high - scale.low);
   for (let i = 0; i < across; i++)
     for (let j = 0; j < up; j++) {
-      const level = Math.max(0, Math.min(255, Math.round((values[i * up + j]! - scale.low) * factor)));
-      const at = 4 * ((up - 1 - j) * across + i);
-      image.data[at] = colours[3 * level]!;
-      image.data[at + 1] = colours[3 * level + 1]!;
-      image.data[at + 2] = colours[3 * level + 2]!;
-      image.data[at + 3] = 255;
+      const value = values[i * up + j]!;
+      const level = Math.max(0, Math.min(255, Math.round((value - scale.low) * factor)));
+      const colour = Number.isNaN(value) ? SOLID : colours.subarray(3 * level, 3 * level + 3);
+      image.data.set([...colour, 255], 4 * ((up - 1 - j) * across + i));
     }
   return image;
 }

@@ -30,7 +30,8 @@ export function contour(values: ArrayLike<number>, shape: number[], level: numbe
       const crossed: Point[] = [];
       corners.forEach(([x, y, value], n) => {
         const [nextX, nextY, next] = corners[(n + 1) % 4]!;
-        if (value < level === next < level) return;
+        // No line runs where there is no air.
+        if (Number.isNaN(value + next) || value < level === next < level) return;
         const part = (level - value) / (next - value);
         crossed.push([(x + part * (nextX - x)) / (across - 1), (y + part * (nextY - y)) / (up - 1)]);
       });

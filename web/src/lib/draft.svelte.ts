@@ -125,7 +125,7 @@ class Draft {
     }
   }
 
-  /** Makes the experiment, or changes it, and goes on to its rig. */
+  /** Makes the experiment, or changes it, and goes on to its rig or to the import of its pictures. */
   async send(): Promise<void> {
     if (this.experiment) {
       const there = { experiment: this.experiment };
@@ -138,9 +138,10 @@ class Draft {
     } else {
       const made = await ask("POST /experiments/from-answers", {}, { answers: this.answers });
       localStorage.removeItem(KEPT);
-      [bench.experiment, bench.page] = [made.experiment, "Rig"];
+      // Pictures that were taken elsewhere have no camera to connect.
+      [bench.experiment, bench.page] = [made.experiment, bench.importing ? "Capture" : "Rig"];
       await bench.refresh();
-      await bench.connect();
+      if (!bench.importing) await bench.connect();
     }
     await bench.refresh();
   }

@@ -22,8 +22,11 @@ import { arrows, speedLimit, streamlines, Strokes, type Grid, type Lines } from 
 import type { Opening, Vector } from "./room";
 import { ticksOf } from "./ticks";
 
-export interface Modes {
-  plane: boolean;
+export type Axis = "x" | "y" | "z";
+export const AXES: readonly Axis[] = ["x", "y", "z"];
+
+/** What is shown; x, y and z are the planes across them. */
+export interface Modes extends Record<Axis, boolean> {
   volume: boolean;
   surface: boolean;
   arrows: boolean;
@@ -46,14 +49,14 @@ export interface Stands {
 export interface Scene3d {
   /** Takes what is shown; the fastest speed [m/s] is given back where velocity is known. */
   load(values: Numbers, velocity: Numbers[] | null, axes: Grid["axes"], scale: Scale, stands: Stands): number;
-  /** `level` and `at` are shares: of the scale for the isosurface, of the room's depth for the plane. */
-  show(modes: Modes, level: number, at: number): void;
+  /** `level` and `cuts` are shares: of the scale for the isosurface, of the room along an axis for its plane. */
+  show(modes: Modes, level: number, cuts: Record<Axis, number>): void;
   look(from: keyof typeof VIEWS): void;
   move(on: boolean): void;
   picture(): Promise<string>;
   /** A film of so many seconds as it is seen; null where the browser cannot make one. */
   film(seconds: number): Promise<Blob | null>;
-  /** The place on the shown plane under a pixel of the view, in metres; null beside it. */
+  /** The place on the nearest shown plane under a pixel of the view, in metres; null beside it. */
   under(x_px: number, y_px: number): Vector | null;
   /** Where one looks from: position, focus and what is up, in nine numbers. */
   seen(): number[];
@@ -68,6 +71,10 @@ const SMOOTH_MS = 90;
 const FASTER = 4;
 const TAIL_S = 3;
 const FRAME_MS = 40;
+// A way along which a plane is dragged is at least so long on the screen.
+const SHORTEST_PX = 12;
+// How far below the middle of the room one looks from the corner, in halves of its height.
+const LOWER = 0.2;
 const OPENINGS = {
   inlet: [0.45, 0.85, 1],
   outlet: [1, 0.75, 0.4],
@@ -75,14 +82,15 @@ const OPENINGS = {
   object: [0.6, 0.6, 0.62],
 } as const;
 
-export function createScene(place: HTMLElement): Scene3d {
+/** `dragged` hears the share of the room at which a plane's grip is held. */
+export function createScene(place: HTMLElement, dragged: (axis: Axis, share: number) => void): Scene3d {
   const view = vtkGenericRenderWindow.newInstance({ background: [0.08, 0.09, 0.11], listenWindowResize: false });
   view.setContainer(place as HTMLDivElement);
   const renderer = view.getRenderer();
   const window3d = view.getRenderWindow();
   const watch = new ResizeObserver(() => {
     view.resize();
-    marks.put();
+    put();
   });
   watch.observe(place);
   view.resize();
@@ -93,8 +101,9 @@ export function createScene(place: HTMLElement): Scene3d {
   const cubes = vtkImageMarchingCubes.newInstance({ computeNormals: true, mergePoints: true });
   const surface = actorOf(cubes.getOutputPort());
   surface.getProperty().setOpacity(0.7);
-  const [planeActor, arrowActor, lineActor, strokeActor] = [0, 1, 2, 3].map(() => vtkActor.newInstance()) as Actor[];
-  planeActor!.getProperty().setLighting(false);
+  const [arrowActor, lineActor, strokeActor] = [0, 1, 2].map(() => vtkActor.newInstance()) as Actor[];
+  const planes = { x: vtkActor.newInstance(), y: vtkActor.newInstance(), z: vtkActor.newInstance() };
+  for (const axis of AXES) planes[axis].getProperty().setLighting(false);
   arrowActor!.getProperty().setLineWidth(2);
   lineActor!.getProperty().setLineWidth(1.5);
   // What moves along them is to be seen first.
@@ -103,11 +112,13 @@ export function createScene(place: HTMLElement): Scene3d {
   const outline = vtkOutlineFilter.newInstance();
   const frame = actorOf(outline.getOutputPort());
   frame.getProperty().setColor(0.6, 0.65, 0.7);
-  const marks = new Marks(place, (at) => {
+  const onScreen = (at: Vector): [number, number] => {
     const { width, height } = place.getBoundingClientRect();
     const [x = 0, y = 0] = renderer.worldToNormalizedDisplay(at[0], at[1], at[2], width / Math.max(1, height));
     return [x * width, (1 - y) * height];
-  });
+  };
+  const marks = new Marks(place, onScreen);
+  const grips = { x: grip("x"), y: grip("y"), z: grip("z") };
   let walls: Actor[] = [];
   let scale: Scale = { low: 0, high: 1, kind: "rising" };
   let shown: { values: Numbers; axes: Grid["axes"] } | null = null;
@@ -115,7 +126,52 @@ export function createScene(place: HTMLElement): Scene3d {
   let stride = 0;
   let voxel_m = 1;
   let timer = 0;
-  let depth = 0.5;
+  let cuts: Record<Axis, number> = { x: 0.5, y: 0.5, z: 0.5 };
+
+  /** What a plane is held by: a dot at one of its corners. By keyboard the plane has its slider. */
+  function grip(axis: Axis): HTMLElement {
+    const element = document.createElement("span");
+    element.className = "grip";
+    element.title = `Drag the plane along ${axis}`;
+    element.hidden = true;
+    element.onpointerdown = (event) => {
+      event.stopPropagation();
+      element.setPointerCapture(event.pointerId);
+    };
+    element.onpointermove = (event) => {
+      if (!element.hasPointerCapture(event.pointerId)) return;
+      event.stopPropagation();
+      const box = place.getBoundingClientRect();
+      const [from, to] = [onScreen(cornerOf(axis, 0)), onScreen(cornerOf(axis, 1))];
+      const along = [to[0] - from[0], to[1] - from[1]] as const;
+      const length = along[0] ** 2 + along[1] ** 2;
+      // Seen end on, a plane has no way to go.
+      if (length < SHORTEST_PX ** 2) return;
+      const far = (event.clientX - box.left - from[0]) * along[0] + (event.clientY - box.top - from[1]) * along[1];
+      dragged(axis, Math.max(0, Math.min(1, far / length)));
+    };
+    place.append(element);
+    return element;
+  }
+
+  /** Where the grip of a plane is that lies at a share of the room. */
+  function cornerOf(axis: Axis, share: number): Vector {
+    const sides = { x: { y: 0, z: 1 }, y: { x: 1, z: 1 }, z: { x: 1, y: 0 } }[axis] as Partial<Record<Axis, number>>;
+    return AXES.map((one) => {
+      const places = shown?.axes[one] ?? [0, 1];
+      const [low, high] = [places[0] ?? 0, places.at(-1) ?? 1];
+      return low + (sides[one] ?? share) * (high - low);
+    }) as Vector;
+  }
+
+  /** Puts words and grips where they belong. */
+  function put(): void {
+    marks.put();
+    for (const axis of AXES) {
+      const [left, top] = onScreen(cornerOf(axis, cuts[axis]));
+      grips[axis].style.transform = `translate(-50%, -50%) translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
+    }
+  }
 
   function load(
     values: Numbers,
@@ -125,7 +181,7 @@ export function createScene(place: HTMLElement): Scene3d {
     { openings, camera }: Stands,
   ): number {
     scale = wanted;
-    const image = imageOf(values, axes);
+    const image = imageOf(values, axes, scale);
     volumeMapper.setInputData(image);
     voxel_m = Math.min(...image.getSpacing());
     volumeMapper.setSampleDistance((stride || STRIDES[0]) * voxel_m);
@@ -135,12 +191,12 @@ export function createScene(place: HTMLElement): Scene3d {
     cubes.setInputData(image);
     outline.setInputData(image);
     const fastest = velocity ? flow({ axes, u: velocity[0]!, v: velocity[1]!, w: velocity[2]! }) : 0;
-    planeActor!.setMapper(planeMapper(values, axes, 0.5, scale));
+    for (const axis of AXES) planes[axis].setMapper(planeMapper(values, axes, axis, cuts[axis], scale));
     walls = [...openings.map(openingOf), ...(camera ? [sightOf(camera, axes)] : [])];
     renderer.removeAllViewProps();
     renderer.addVolume(volume);
     // An actor that has nothing to draw yet cannot be rendered.
-    for (const actor of [planeActor!, surface, arrowActor!, lineActor!, strokeActor!, frame, ...walls])
+    for (const actor of [...Object.values(planes), surface, arrowActor!, lineActor!, strokeActor!, frame, ...walls])
       if (actor.getMapper()) renderer.addActor(actor);
     marks.set([
       ...axisMarks(axes),
@@ -164,16 +220,19 @@ export function createScene(place: HTMLElement): Scene3d {
     return fastest;
   }
 
-  function show(modes: Modes, level: number, at: number): void {
+  function show(modes: Modes, level: number, at: Record<Axis, number>): void {
+    cuts = at;
     if (!shown) return;
-    if (modes.plane) planeActor!.setMapper(planeMapper(shown.values, shown.axes, at, scale));
-    planeActor!.setVisibility(modes.plane);
+    for (const axis of AXES) {
+      if (modes[axis]) planes[axis].setMapper(planeMapper(shown.values, shown.axes, axis, at[axis], scale));
+      planes[axis].setVisibility(modes[axis]);
+      grips[axis].hidden = !modes[axis];
+    }
     volume.setVisibility(modes.volume);
     surface.setVisibility(modes.surface);
     arrowActor!.setVisibility(modes.arrows && strokes !== null);
     lineActor!.setVisibility(modes.streamlines && strokes !== null);
     strokeActor!.setVisibility(modes.streamlines && strokes !== null);
-    depth = at;
     const value = scale.low + level * (scale.high - scale.low);
     if (modes.surface) cubes.setContourValue(value);
     const colour: number[] = [0, 0, 0];
@@ -182,7 +241,7 @@ export function createScene(place: HTMLElement): Scene3d {
     if (!stride && modes.volume) pace();
     const began_ms = performance.now();
     window3d.render();
-    marks.put();
+    put();
     place.dataset["frameMs"] = (performance.now() - began_ms).toFixed(1);
   }
 
@@ -194,12 +253,20 @@ export function createScene(place: HTMLElement): Scene3d {
     camera.setPosition(x + dx, y + dy, z + dz);
     camera.setViewUp(0, 0, 1);
     renderer.resetCamera();
+    if (from === "Corner") {
+      // The words of the axes stand below the room: one looks a little lower.
+      const heights = shown?.axes.z ?? [];
+      const lower = (LOWER * ((heights.at(-1) ?? 0) - (heights[0] ?? 0))) / 2;
+      const [[fx, fy, fz], [px, py, pz]] = [[...camera.getFocalPoint()] as Vector, [...camera.getPosition()] as Vector];
+      camera.setFocalPoint(fx, fy, fz - lower);
+      camera.setPosition(px, py, pz - lower);
+    }
     // On a narrow screen the room's width is the limit.
     const isNarrow = place.clientWidth < 1.2 * place.clientHeight;
-    camera.zoom(isNarrow ? 0.85 : from === "Corner" ? 1.1 : 1.3);
+    camera.zoom(isNarrow ? 0.85 : from === "Corner" ? 1.08 : 1.3);
     renderer.resetCameraClippingRange();
     window3d.render();
-    marks.put();
+    put();
   }
 
   function move(on: boolean): void {
@@ -258,19 +325,24 @@ export function createScene(place: HTMLElement): Scene3d {
   }
 
   function under(x_px: number, y_px: number): Vector | null {
-    if (!shown || !planeActor!.getVisibility()) return null;
+    if (!shown) return null;
     const { width, height } = place.getBoundingClientRect();
     const ratio = width / Math.max(1, height);
     const [near, far] = [0, 1].map((z) =>
       renderer.normalizedDisplayToWorld(x_px / width, 1 - y_px / height, z, ratio),
     ) as [Vector, Vector];
-    const { x, y, z } = shown.axes;
-    const places = shown.values.shape[1] ?? 1;
-    const plane = y[Math.round(depth * (places - 1))] ?? 0;
-    const share = (plane - near[1]) / (far[1] - near[1] || 1e-12);
-    const at = near.map((start, a) => start + share * (far[a]! - start)) as Vector;
-    const within = (value: number, axis: number[]) => value >= (axis[0] ?? 0) && value <= (axis.at(-1) ?? 0);
-    return within(at[0], x) && within(at[2], z) ? at : null;
+    const { axes } = shown;
+    const isWithin = (at: Vector, except: Axis) =>
+      AXES.every((one, a) => one === except || (at[a]! >= (axes[one][0] ?? 0) && at[a]! <= (axes[one].at(-1) ?? 0)));
+    const hits = AXES.filter((one) => planes[one].getVisibility()).flatMap((one) => {
+      const a = AXES.indexOf(one);
+      const plane = axes[one][nearestIndex(cuts[one], axes[one].length)] ?? 0;
+      const share = (plane - near[a]!) / (far[a]! - near[a]! || 1e-12);
+      const at = near.map((start, b) => start + share * (far[b]! - start)) as Vector;
+      at[a] = plane;
+      return share > 0 && isWithin(at, one) ? [{ at, share }] : [];
+    });
+    return hits.sort((one, other) => one.share - other.share)[0]?.at ?? null;
   }
 
   function seen(): number[] {
@@ -287,7 +359,7 @@ export function createScene(place: HTMLElement): Scene3d {
     camera.setViewUp(ux!, uy!, uz!);
     renderer.resetCameraClippingRange();
     window3d.render();
-    marks.put();
+    put();
   }
 
   function close(): void {
@@ -295,10 +367,11 @@ export function createScene(place: HTMLElement): Scene3d {
     watch.disconnect();
     turning.unsubscribe();
     marks.set([]);
+    for (const axis of AXES) grips[axis].remove();
     view.delete();
   }
 
-  const turning = renderer.getActiveCamera().onModified(() => marks.put());
+  const turning = renderer.getActiveCamera().onModified(put);
   return { load, show, look, move, picture, film, under, seen, see, close };
 }
 
@@ -337,19 +410,19 @@ class Marks {
   }
 }
 
-/** Metres along three edges of the room that meet in a lower corner. */
+/** Metres along three edges of the room, which are at its outline as seen from the corner. */
 function axisMarks(axes: Grid["axes"]): Mark[] {
   const [x, y, z] = [axes.x, axes.y, axes.z];
-  const [left, right, front, floor] = [x[0] ?? 0, x.at(-1) ?? 1, y[0] ?? 0, z[0] ?? 0];
+  const [left, right, front, back, floor] = [x[0] ?? 0, x.at(-1) ?? 1, y[0] ?? 0, y.at(-1) ?? 1, z[0] ?? 0];
   const off = 0.06 * (right - left);
   const last = (places: number[]) => ((places.at(-1) ?? 1) + (places[0] ?? 0)) / 2;
   return [
     ...ticksOf(x).map((one) => ({ text: one.label, at: [one.value, front - off, floor - off] as Vector })),
     ...ticksOf(y).map((one) => ({ text: one.label, at: [right + off, one.value, floor - off] as Vector })),
-    ...ticksOf(z).map((one) => ({ text: one.label, at: [left - off, front - off, one.value] as Vector })),
+    ...ticksOf(z).map((one) => ({ text: one.label, at: [left - off, back + off, one.value] as Vector })),
     { text: "x [m]", at: [last(x), front - 2.6 * off, floor - 2.6 * off] },
     { text: "y [m]", at: [right + 2.6 * off, last(y), floor - 2.6 * off] },
-    { text: "z [m]", at: [left - 2.8 * off, front - 2.8 * off, last(z)] },
+    { text: "z [m]", at: [left - 2.8 * off, back + 2.8 * off, last(z)] },
   ];
 }
 
@@ -359,7 +432,9 @@ const NEAREST = 0.45;
 /** The camera, on its way to the room where it stands far away, and how far from the wall it really is. */
 function cameraMark(camera: Vector, axes: Grid["axes"]): Mark {
   const away = (axes.y.at(-1) ?? 1) - camera[1];
-  return { text: `camera, ${away.toFixed(away < 10 ? 1 : 0)} m from the wall`, at: standOf(camera, axes) };
+  const [x, y, z] = standOf(camera, axes);
+  const above = 0.12 * ((axes.z.at(-1) ?? 1) - (axes.z[0] ?? 0));
+  return { text: `camera, ${away.toFixed(away < 10 ? 1 : 0)} m from the wall`, at: [x, y, z + above] };
 }
 
 function standOf(camera: Vector, axes: Grid["axes"]): Vector {
@@ -414,17 +489,30 @@ function openingOf(one: Opening): Actor {
   return actor;
 }
 
-/** The vertices of one plane across y as a surface, coloured at each vertex. */
-function planeMapper(values: Numbers, axes: Grid["axes"], at: number, scale: Scale) {
-  const [nx = 1, ny = 1, nz = 1] = values.shape;
-  const j = Math.round(at * (ny - 1));
-  const [places, colours, cells] = [new Float32Array(3 * nx * nz), new Float32Array(nx * nz), [] as number[]];
-  for (let i = 0; i < nx; i++)
-    for (let k = 0; k < nz; k++) {
-      const n = i * nz + k;
-      places.set([axes.x[i] ?? 0, axes.y[j] ?? 0, axes.z[k] ?? 0], 3 * n);
-      colours[n] = values.values[(i * ny + j) * nz + k]!;
-      if (i + 1 < nx && k + 1 < nz) cells.push(4, n, n + nz, n + nz + 1, n + 1);
+const nearestIndex = (share: number, count: number) => Math.round(share * (count - 1));
+
+/** The vertices of one plane across an axis as a surface, coloured at each vertex; a hole where there is no air. */
+function planeMapper(values: Numbers, axes: Grid["axes"], axis: Axis, share: number, scale: Scale) {
+  const a = AXES.indexOf(axis);
+  const [b, c] = [0, 1, 2].filter((other) => other !== a) as [number, number];
+  const [, ny = 1, nz = 1] = values.shape;
+  const [rows, columns] = [values.shape[b] ?? 1, values.shape[c] ?? 1];
+  const at = [0, 0, 0];
+  at[a] = nearestIndex(share, values.shape[a] ?? 1);
+  const [places, colours] = [new Float32Array(3 * rows * columns), new Float32Array(rows * columns)];
+  for (let i = 0; i < rows; i++)
+    for (let k = 0; k < columns; k++) {
+      [at[b], at[c]] = [i, k];
+      const n = i * columns + k;
+      places.set([axes.x[at[0]!] ?? 0, axes.y[at[1]!] ?? 0, axes.z[at[2]!] ?? 0], 3 * n);
+      colours[n] = values.values[(at[0]! * ny + at[1]!) * nz + at[2]!]!;
+    }
+  const cells: number[] = [];
+  for (let i = 0; i + 1 < rows; i++)
+    for (let k = 0; k + 1 < columns; k++) {
+      const n = i * columns + k;
+      const corners = [n, n + columns, n + columns + 1, n + 1];
+      if (!corners.some((one) => Number.isNaN(colours[one]!))) cells.push(4, ...corners);
     }
   const data = vtkPolyData.newInstance();
   const points = vtkPoints.newInstance();
@@ -439,7 +527,9 @@ function planeMapper(values: Numbers, axes: Grid["axes"], at: number, scale: Sca
   return mapper;
 }
 
-function imageOf(values: Numbers, axes: Grid["axes"]) {
+/** The field for volume and isosurface; what is no air has the value that is not seen. */
+function imageOf(values: Numbers, axes: Grid["axes"], scale: Scale) {
+  const unseen = scale.kind === "signed" ? (scale.low + scale.high) / 2 : scale.low;
   const [nx = 1, ny = 1, nz = 1] = values.shape;
   const image = vtkImageData.newInstance();
   image.setDimensions(nx, ny, nz);
@@ -450,7 +540,10 @@ function imageOf(values: Numbers, axes: Grid["axes"]) {
   const turned = new Float32Array(values.values.length);
   for (let i = 0; i < nx; i++)
     for (let j = 0; j < ny; j++)
-      for (let k = 0; k < nz; k++) turned[i + nx * (j + ny * k)] = values.values[(i * ny + j) * nz + k]!;
+      for (let k = 0; k < nz; k++) {
+        const value = values.values[(i * ny + j) * nz + k]!;
+        turned[i + nx * (j + ny * k)] = Number.isNaN(value) ? unseen : value;
+      }
   image.getPointData().setScalars(vtkDataArray.newInstance({ name: "field", values: turned }));
   return image;
 }

@@ -83,6 +83,18 @@ def test_encodings_are_as_fine_as_they_say(encoding, error_k: float):
     assert np.abs(values.reshape(T.shape) - T).max() <= error_k * span_k + 2e-5 * (encoding != "f32")
 
 
+def test_where_there_is_no_air_no_number_is_sent():
+    holed = T.copy()
+    holed[1, 1, 1] = np.nan
+    packed = pack(holed, "u16")
+    numbers = np.frombuffer(packed.content, "<u2").reshape(T.shape)
+    assert packed.headers["X-Missing"] == "65535"
+    assert np.array_equal(numbers == 65535, np.isnan(holed))
+    values = packed.offset + packed.scale * numbers.astype(np.float64)
+    assert np.nanmax(np.abs(values - holed)[numbers < 65535]) < 1e-4
+    assert "X-Missing" not in pack(T, "u16").headers
+
+
 def test_a_report_runs_nothing_and_reaches_nothing(live: Live, airlens: Client, made: tuple[str, str]):
     assert airlens.report(*made).startswith("<h1>Report")
     with live.client() as http:
