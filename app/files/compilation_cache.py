@@ -29,7 +29,8 @@ def use_compilation_cache() -> Path | None:
         return None  # A home that cannot be written: everything is compiled anew.
     for name, value in {
         "jax_compilation_cache_dir": str(folder),
-        "jax_persistent_cache_min_compile_time_secs": 0.5,
+        # Small programs too: a solve has some two hundred, and compiles them in a quarter of a draft's time.
+        "jax_persistent_cache_min_compile_time_secs": 0,
     }.items():
         os.environ[name.upper()] = str(value)  # read when JAX is imported, which is not done for this
         if "jax" in sys.modules:

@@ -17,6 +17,8 @@ _CATEGORIES = (
     (20.0, "some people (category B)"),
     (30.0, "many people (category C)"),
 )
+# The air change efficiency of a room that is mixed at once.
+_MIXED_PERCENT = 50.0
 # A camera of fewer pixels, or a mean of fewer frames, sees less than a usual one.
 _PIXELS, _FRAMES = 2000, 100
 
@@ -60,17 +62,20 @@ def _people(finding: Finding) -> str:
     if "air_changes" not in figures:
         return f"{felt}."
     changes, efficiency = figures["air_changes"], figures["efficiency"]
-    mixed = (
-        "better than"
-        if efficiency.value > 55
-        else "worse than"
-        if efficiency.value < 45
-        else "about as well as"
-    )
     return (
-        f"{felt}; the supply changes the air {_value(changes, 'times an hour')} and ventilates {mixed} "
-        f"a room that is mixed at once (efficiency {_value(efficiency, '%')}, mixed: 50 %)."
+        f"{felt}; the supply changes the air {_value(changes, 'times an hour')} and {ventilates(efficiency)}."
     )
+
+
+def ventilates(efficiency: Quantity) -> str:
+    """Better or worse than a mixed room, where its whole interval says so."""
+    low, high = (efficiency.value if end is None else end for end in (efficiency.low, efficiency.high))
+    known = f"(efficiency {_value(efficiency, '%')}, mixed: {_MIXED_PERCENT:g} %)"
+    if low > _MIXED_PERCENT:
+        return f"ventilates better than a room that is mixed at once {known}"
+    if high < _MIXED_PERCENT:
+        return f"ventilates worse than a room that is mixed at once {known}"
+    return f"ventilates like a room that is mixed at once, as far as can be told {known}"
 
 
 def _sure(finding: Finding) -> str:

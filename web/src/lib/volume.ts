@@ -284,8 +284,9 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
       window3d.render();
       place.dataset["moved"] = String(Number(place.dataset["moved"] ?? 0) + 1);
     }
-    // What drawing takes is left free for everything else.
-    timer = window.setTimeout(step, Math.max(FRAME_MS, performance.now() - began_ms));
+    // At least a fifth of the time is left free for everything else.
+    const took_ms = performance.now() - began_ms;
+    timer = window.setTimeout(step, Math.max(FRAME_MS - took_ms, took_ms / 4));
   }
 
   /** Choose the finest stride that this machine draws smoothly: without a graphics card a frame costs as much as its samples. */
