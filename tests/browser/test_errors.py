@@ -28,7 +28,10 @@ def test_every_page_shows_a_refusal_in_the_services_words(station: Station, open
     experiment = station.app.state.services.folders.open(name)
     keep(experiment, "20260101T000000-standard", room(), "standard", 1.0)
     page = opens(station.address).page
+    # It opens with what was found.
+    expect(page.locator(".slice canvas").first).to_be_visible()
 
+    go_to(page, "Rig")
     page.get_by_label("Gain").fill("100")
     page.get_by_role("button", name="Set", exact=True).click()
     told(page, "Gain 100 is not possible; expected 1 to 16.")
