@@ -305,9 +305,9 @@ BoundaryInformation = PlaneField | Inlet | Outlet | Wall | Heater | PointSensors
 
 @setting
 class FlowModel:
-    """Transport of momentum and heat: molecular, given effective coefficients, or a closure / learned."""
+    """Transport of momentum and heat: molecular, given effective coefficients, or a closure."""
 
-    transport: Literal["auto", "molecular", "given", "zero_equation", "k_epsilon", "learned"] = "auto"
+    transport: Literal["auto", "molecular", "given", "zero_equation", "k_epsilon"] = "auto"
     """How momentum and heat spread."""
     viscosity_m2_s: float | None = None
     """With `given`: effective viscosity, 1e-9 to 1e3."""

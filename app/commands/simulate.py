@@ -17,6 +17,10 @@ def register(cli: typer.Typer) -> None:
 def simulate(
     experiment: Annotated[Path, typer.Argument(help="New experiment folder.")],
     truth: Annotated[Path, typer.Option(help="Room volume (NPZ).")],
+    snapshots: Annotated[
+        Path | None,
+        typer.Option(help="The air of that room at several moments (NPZ): each flow frame sees its own."),
+    ] = None,
     light: Annotated[
         Literal["texture", "projector"], typer.Option(help="What patterns the wall.")
     ] = "texture",
@@ -25,6 +29,7 @@ def simulate(
     ] = "operator",
     camera_px: Size = "4096x3072",
     frames: Annotated[int, typer.Option(min=1, help="Frames averaged in each capture.")] = 100,
+    frame_rate: Annotated[float, typer.Option(min=1e-3, max=10_000.0, help="Frames a second [1/s].")] = 30.0,
     full_well: Annotated[float, typer.Option(help="Full well of a pixel [e-].")] = 10_000.0,
     world: Annotated[
         Literal["ideal", "lab"],
@@ -81,7 +86,7 @@ def simulate(
         pattern_seed=seed,
     )
     shown = changed(WORLDS[world], nuisance or [], drift_px, border, misread)
-    camera = shown.camera(seed, noise_free)
+    camera = shown.camera(seed, noise_free).model_copy(update={"frame_rate_hz": frame_rate})
     with Progress(transient=True) as progress:
         tasks = {}
 
@@ -90,7 +95,16 @@ def simulate(
                 tasks[name] = progress.add_task(f"{name} capture", total=total)
             progress.update(tasks[name], completed=done)
 
-        run(truth, experiment, options, information, camera, stage, misreads=shown.misreads)
+        run(
+            truth,
+            experiment,
+            options,
+            information,
+            camera,
+            stage,
+            misreads=shown.misreads,
+            snapshots_path=snapshots,
+        )
     typer.echo(f"{experiment}: reference and flow captured. Next: airlens reconstruct {experiment}")
 
 

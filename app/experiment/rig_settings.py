@@ -46,8 +46,12 @@ class SimulatedCameraSettings(Strict):
     """A camera that computes its pictures."""
     room: str = "truth.npz"
     """The room that it looks at, in the experiment."""
+    snapshots: str | None = None
+    """The air of that room at several moments, in the experiment; without them the air is steady."""
     exposure_s: Annotated[float, Field(gt=0, le=60)] = 0.02
     """Exposure of a frame."""
+    frame_rate_hz: Annotated[float, Field(gt=0, le=10_000)] = 30.0
+    """Frames a second, at most."""
     seed: int = 0
     """Of noise and drift."""
     drift_px: Annotated[float, Field(ge=0, le=20)] = 0.0

@@ -13,7 +13,7 @@ from app.rig.cameras import open_real
 from app.rig.inventory import found_cameras
 from app.rig.practice_room import PracticeRoom
 from app.rig.projectors import open_real_projector
-from app.rig.rendered import AirState, seen_picture
+from app.rig.rendered import AirState, moving_pictures, seen_picture
 from app.rig.stage import RealStage, Stage, Task
 from calibration.board import Board
 from core.geometry import Optics
@@ -162,9 +162,17 @@ def _simulated_camera(
     experiment: Experiment, settings: SimulatedCameraSettings, air: AirState, view: int, steps: int
 ) -> SimulatedCamera:
     scene = experiment.settings.scene
-    image = _memo(lambda: seen_picture(experiment, settings, air, view, steps))
+    moves = air == "moving" and settings.snapshots is not None
+    moving = moving_pictures(experiment, settings, view, steps) if moves else None
+    image = _memo(
+        (lambda: seen_picture(experiment, settings, air, view, steps))
+        if moving is None
+        else (lambda: moving(0.0))
+    )
     return SimulatedCamera(
         image,
+        moving=moving,
+        frame_rate_hz=settings.frame_rate_hz,
         seed=2 * settings.seed + steps,
         noise=_sensor(scene, settings, view),
         flicker=settings.world.flicker,

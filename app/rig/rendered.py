@@ -1,16 +1,20 @@
 """What a simulated camera sees: the experiment's room, rendered, on a mount that creeps."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Float32
 
+from app.errors import BadInputError
 from app.experiment.folder import Experiment
 from app.experiment.rig_settings import SimulatedCameraSettings
 from app.rig.nuisances import spoiled
 from app.volume.file import RoomVolume, read_volume
 from app.volume.scene import room_box, room_objects
+from app.volume.snapshots import read_snapshots
 from core.fields import GridField
 from core.geometry import Box, crop, rotation_matrix, rotation_vector
 from core.plan.print_choice import suited_print
@@ -33,11 +37,41 @@ def seen_picture(
     experiment: Experiment, settings: SimulatedCameraSettings, air: AirState, view: int, steps: int
 ) -> Picture:
     """The luminance of every pixel after so many steps of the mount; 1 fills the well. Raises BadInputError."""
+    scene = _mounted(experiment, settings, view, steps)
+    volume = read_volume(experiment.file(settings.room))
+    field = None if air == "still" else volume_field(volume, scene)
+    picture = _rendered(volume, settings, scene, field, view)
+    return spoiled(picture, settings.world, steps, settings.seed)
+
+
+def moving_pictures(
+    experiment: Experiment, settings: SimulatedCameraSettings, view: int, steps: int
+) -> Callable[[float], Picture]:
+    """What is seen at a time [s]: the picture of the snapshot nearest to it, the same array while that stays.
+
+    Raises BadInputError.
+    """
+    if settings.snapshots is None:
+        raise BadInputError("This simulated camera has no snapshots; state rig.camera.snapshots.")
+    scene = _mounted(experiment, settings, view, steps)
+    volume = read_volume(experiment.file(settings.room))
+    snapshots = read_snapshots(experiment.file(settings.snapshots), scene.room)
+
+    @lru_cache(maxsize=2)
+    def picture(index: int) -> Picture:
+        field = temperature_field(snapshots.temperature_k[index], scene)
+        drawn = _rendered(volume, settings, scene, field, view)
+        return spoiled(drawn, settings.world, steps, settings.seed)
+
+    return lambda time_s: picture(snapshots.nearest(time_s))
+
+
+def _mounted(experiment: Experiment, settings: SimulatedCameraSettings, view: int, steps: int) -> Scene:
+    """The scene after so many steps of the mount."""
     scene = _as_it_is(experiment, settings)
     for step in range(steps):
         scene = drifted(scene, view, settings.drift_px, settings.world.breathing_px, settings.seed + step)
-    picture = _rendered(experiment, settings, scene, air, view)
-    return spoiled(picture, settings.world, steps, settings.seed)
+    return scene
 
 
 def _as_it_is(experiment: Experiment, settings: SimulatedCameraSettings) -> Scene:
@@ -49,13 +83,14 @@ def _as_it_is(experiment: Experiment, settings: SimulatedCameraSettings) -> Scen
 
 
 def _rendered(
-    experiment: Experiment, settings: SimulatedCameraSettings, scene: Scene, air: AirState, view: int
+    volume: RoomVolume,
+    settings: SimulatedCameraSettings,
+    scene: Scene,
+    field: GridField | None,
+    view: int,
 ) -> Picture:
-    volume = read_volume(experiment.file(settings.room))
-    if air == "still":
-        image = render_reference(scene, view)
-    else:
-        image = render_flow(scene, volume_field(volume, scene), view)
+    """The room through this air, or through still air; with its frame and its objects."""
+    image = render_reference(scene, view) if field is None else render_flow(scene, field, view)
     framed = _framed(image, scene, view) if settings.border == "print" else image
     # What stands in the room, whether or not the scene states it.
     return with_objects(framed, replace(scene, objects=room_objects(volume)), view)
@@ -127,7 +162,12 @@ def _strips_around(inside: np.ndarray) -> list[tuple[slice, slice]]:
 
 def volume_field(volume: RoomVolume, scene: Scene) -> GridField:
     """The volume's excess refractivity on evenly spaced vertices."""
-    excess_k = _evenly_spaced(volume).astype(np.float64) - scene.air.ambient_temperature_k
+    return temperature_field(_evenly_spaced(volume), scene)
+
+
+def temperature_field(temperature_k: Float32[np.ndarray, "nx ny nz"], scene: Scene) -> GridField:
+    """The excess refractivity of these temperatures on evenly spaced vertices."""
+    excess_k = temperature_k.astype(np.float64) - scene.air.ambient_temperature_k
     excess = -scene.air.ambient_refractivity * excess_k / (scene.air.ambient_temperature_k + excess_k)
     room: Box = scene.room
     return GridField(room.lower_m, room.upper_m, excess.astype(np.float32))

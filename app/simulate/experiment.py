@@ -1,7 +1,7 @@
 """`simulate`: a complete experiment from a room volume, taken by the same capture code as a real one."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,12 +15,14 @@ from app.files.durable import durable_folder, write_durably, write_text
 from app.rig.open import air_of, open_camera
 from app.volume.file import RoomVolume, read_volume
 from app.volume.misread import misread
-from app.volume.scene import Information, RigOptions, room_scene, write_plane
+from app.volume.scene import Information, RigOptions, room_box, room_scene, write_plane
+from app.volume.snapshots import read_snapshots
 from calibration.bundle import given_bundle, to_json
 from core.scene import PlaneField, ProjectedPattern, Scene
 from drivers.burst import CapturePlan, CaptureRole, Progress
 
 TRUTH_FILE = "truth.npz"
+SNAPSHOTS_FILE = "snapshots.npz"
 
 OnStage = Callable[[str, int, int], object]
 
@@ -35,11 +37,13 @@ def simulate(
     *,
     misreads: bool = False,
     cells: int | Literal["auto"] = "auto",
+    snapshots_path: Path | None = None,
 ) -> Path:
     """Make an experiment folder from a volume: scene, calibration, reference and flow captures.
 
     With `misreads` what is known of the boundary is as wrong as its deviations say, by the camera's seed.
-    `cells` is the solver's grid, as the scene states it.
+    `cells` is the solver's grid, as the scene states it. With snapshots each frame of a flow capture sees the air
+    of its moment.
     The whole folder appears at once, when it is complete. The truth is copied into it for the simulated
     rig and `score`; no reconstruction reads it. Raises BadInputError, SettingError.
     """
@@ -49,14 +53,19 @@ def simulate(
     scene = room_scene(volume, options, information)
     scene = misread(scene, camera.seed) if misreads else scene
     scene = replace(scene, solve=replace(scene.solve, grid=cells))
+    files = {TRUTH_FILE: truth_path}
+    if snapshots_path is not None:
+        read_snapshots(snapshots_path, room_box(volume))
+        files[SNAPSHOTS_FILE] = snapshots_path
+        camera = camera.model_copy(update={"snapshots": SNAPSHOTS_FILE})
     with durable_folder(folder) as unfinished:
-        _fill(unfinished, truth_path, volume, scene, information, camera, on_stage)
+        _fill(unfinished, files, volume, scene, information, camera, on_stage)
     return folder
 
 
 def _fill(
     folder: Path,
-    truth_path: Path,
+    files: Mapping[str, Path],
     volume: RoomVolume,
     scene: Scene,
     information: Information,
@@ -64,13 +73,14 @@ def _fill(
     on_stage: OnStage,
 ) -> None:
     settings = ExperimentSettings(
-        title=str(volume.case.get("title", truth_path.stem)),
+        title=str(volume.case.get("title", files[TRUTH_FILE].stem)),
         information=information,
         rig=RigSettings(camera=camera),
         scene=scene,
     )
     experiment = create_experiment(folder, settings)
-    write_durably(folder / TRUTH_FILE, lambda temporary: shutil.copyfile(truth_path, temporary))
+    for name, path in files.items():
+        write_durably(folder / name, lambda temporary, path=path: shutil.copyfile(path, temporary))
     if any(isinstance(known, PlaneField) for known in scene.boundary):
         write_plane(folder, volume)
     write_text(experiment.bundle_path, to_json(_bundle(scene)))

@@ -40,7 +40,7 @@ class Residuals(eqx.Module):
 
 @setting
 class Numbers:
-    """Reynolds, Péclet, Richardson; gravity acts along -z. The first two are arrays where learned."""
+    """Reynolds, Péclet, Richardson; gravity acts along -z. The first two may be traced arrays."""
 
     reynolds: float | Float[Array, ""]
     peclet: float | Float[Array, ""]
@@ -54,14 +54,6 @@ class Numbers:
                 f"Re is {self.reynolds:g} and Pe is {self.peclet:g}; expected finite positive numbers. "
                 "Give viscosity and diffusivity in m2/s (room air with turbulence: about 1e-3)."
             )
-
-    def with_transport(self, viscosity: Float[Array, ""], diffusivity: Float[Array, ""]) -> "Numbers":
-        """The numbers of a flow whose viscosity and diffusivity are these factors larger."""
-        return Numbers(
-            reynolds=self.reynolds / viscosity,
-            peclet=self.peclet / diffusivity,
-            richardson=self.richardson,
-        )
 
 
 def residuals(value: FlowValues, grad: FlowValues, laplacian: FlowValues, numbers: Numbers) -> Residuals:

@@ -46,16 +46,12 @@ class PhysicsLoss(eqx.Module):
     name: str = eqx.field(static=True, default="pde")
 
     def rows(self, fields: Fields, unknowns: Unknowns, key: PRNGKeyArray | None) -> Rows:
-        """Mass, momentum, heat; learned transport divides Re and Pe."""
-        numbers = self.numbers
-        if unknowns.log_transport is not None:
-            factor = jnp.exp(unknowns.log_transport)
-            numbers = numbers.with_transport(factor[0], factor[1])
+        """Mass, momentum, heat."""
         points = None
         if key is not None:
             lower, upper = jnp.array(self.lower)[None], jnp.array(self.upper)[None]
             points = lower + (upper - lower) * jax.random.uniform(key, (self.points, 3))
-        left = fields.residuals(numbers, points)
+        left = fields.residuals(self.numbers, points)
         per_point = self.weight / left.mass.shape[0]
         return tuple(
             (gamma * per_point) ** 0.5 * part
@@ -182,20 +178,16 @@ class SmoothnessLoss(eqx.Module):
 
 
 class PriorLoss(eqx.Module):
-    """Priors: drift and learned transport are zero, within one standard deviation; the drift's is one a view."""
+    """The prior of the camera's motion: zero, within one standard deviation a view."""
 
     drift_std: tuple[float, ...] = eqx.field(static=True, default=())
-    log_transport_std: float = eqx.field(static=True, default=1.0)
     name: str = eqx.field(static=True, default="prior")
 
     def rows(self, fields: Fields, unknowns: Unknowns, key: PRNGKeyArray | None) -> Rows:
-        """One row for each unknown, weighted against losses that are means."""
-        rows = []
-        if unknowns.drift is not None:
-            rows.append(1e-2 * unknowns.drift / jnp.asarray(self.drift_std)[:, None])
-        if unknowns.log_transport is not None:
-            rows.append(1e-1 * unknowns.log_transport / self.log_transport_std)
-        return tuple(rows)
+        """One row, weighted against losses that are means."""
+        if unknowns.drift is None:
+            return ()
+        return (1e-2 * unknowns.drift / jnp.asarray(self.drift_std)[:, None],)
 
 
 def all_rows(losses: Sequence[Loss], unknowns: Unknowns) -> PyTree:

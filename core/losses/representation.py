@@ -46,13 +46,11 @@ class Unknowns(eqx.Module):
 
     `drift`: a motion of each view's picture (camera and projector together; they are the same four numbers to first
     order when the wall is seen face-on), in the units of the losses' `motions`.
-    `log_transport`: logarithms of learned factors on viscosity and diffusivity.
-    None where a scene does not ask for it.
+    None where the camera cannot have moved.
     """
 
     representation: Representation
     drift: Float[Array, "views 4"] | None = None
-    log_transport: Float[Array, "2"] | None = None
 
 
 def positions(span: Span) -> Float[np.ndarray, " n"]:

@@ -88,7 +88,7 @@ class Room(eqx.Module):
 
 
 def closure_name(scene: Scene) -> str:
-    """The closure that a scene states; `auto` and `learned` give k-epsilon."""
+    """The closure that a scene states; `auto` gives k-epsilon."""
     named = {"molecular": "molecular", "given": "constant", "zero_equation": "zero_equation"}
     return named.get(scene.flow.transport, "k_epsilon")
 

@@ -92,7 +92,7 @@ def losses_of(
         losses.append(level)
     if "pde" in regime:
         losses.append(PhysicsLoss(frame.numbers, frame.lower, frame.upper, weights.pde, weights.gamma))
-    if moved(problem) or problem.scene.flow.transport == "learned":
+    if moved(problem):
         units = tuple(_unit(nearly_still(shift)) for shift in problem.shifts)
         losses.append(PriorLoss(tuple(1.0 / unit for unit in units)))
     return tuple(losses)

@@ -38,7 +38,7 @@ def solution_of(
         outcome=outcome,
         solver_s=solver_s,
         history=tuple(history),
-        notes=(*notes, *_learned(unknowns, frame)),
+        notes=(*notes, *_used(unknowns, frame)),
     )
 
 
@@ -47,17 +47,10 @@ def _evaluate(unknowns: Unknowns, spans: Spans) -> FlowValues:
     return unknowns.representation.fields().on_grid(spans)
 
 
-def _learned(unknowns: Unknowns, frame: RoomFrame) -> tuple[str, ...]:
-    """Re, Pe and the drift that were used or found."""
-    numbers, notes = frame.numbers, []
-    if unknowns.log_transport is not None:
-        viscosity, diffusivity = (float(f) for f in np.exp(np.asarray(unknowns.log_transport)))
-        notes.append(
-            f"Learned transport: Re {numbers.reynolds / viscosity:.4g}, "
-            f"Pe {numbers.peclet / diffusivity:.4g}."
-        )
-    else:
-        notes.append(f"Transport as given: Re {numbers.reynolds:.4g}, Pe {numbers.peclet:.4g}.")
+def _used(unknowns: Unknowns, frame: RoomFrame) -> tuple[str, ...]:
+    """Re and Pe that were used, and whether the camera's motion was found."""
+    numbers = frame.numbers
+    notes = [f"Transport as given: Re {numbers.reynolds:.4g}, Pe {numbers.peclet:.4g}."]
     if unknowns.drift is not None:
         notes.append("The motion of the camera between the exposures was solved for together with the air.")
     return tuple(notes)

@@ -2,6 +2,7 @@
 
 It knows no optics. `view()` returns luminance, 1 of which fills the well at the exposure that the camera
 was made with. Return the same array object while nothing changed: the expected counts are then reused.
+`moving(time_s)` takes its place where what is seen changes with the time since the camera was made.
 """
 
 import math
@@ -44,14 +45,16 @@ class SimulatedCamera:
         clock: Clock | None = None,
         faults: FaultScript = no_faults,
         flicker: float = 0.0,
+        moving: Callable[[float], Luminance] | None = None,
         name: str = "simulated camera",
     ) -> None:
         self.shift_px = (0.0, 0.0)
-        self._view, self._seed, self._noise = view, seed, noise or SensorNoise()
+        self._view, self._moving, self._seed, self._noise = view, moving, seed, noise or SensorNoise()
         self._full_well_exposure_s = self._exposure_s = exposure_s
         self._gain, self._frame_rate_hz, self._name = 1.0, frame_rate_hz, name
         self._clock, self._faults, self._flicker = clock or VirtualClock(), faults, flicker
         self._luminance = view()
+        self._made_s = self._clock.now_s()
         self._expected: tuple[object, ExpectedCounts] | None = None
         self._threads: ThreadPoolExecutor | None = None
         self._start()
@@ -179,7 +182,7 @@ class SimulatedCamera:
             raise DeviceNotFoundError(f"{self._name} was unplugged. Plug it in, then reconnect.")
 
     def _draw(self, index: int) -> Pixels:
-        luminance = self._view()
+        luminance = self._view() if self._moving is None else self._moving(self._age_s(index))
         if luminance.shape != self._luminance.shape:
             raise DeviceSettingError(
                 f"The view is now {luminance.shape} instead of {self._luminance.shape} (rows, columns). "
@@ -197,6 +200,10 @@ class SimulatedCamera:
         if self._threads is None:
             self._threads = ThreadPoolExecutor(min(4, os.cpu_count() or 1), "simulated-camera")
         return self._expected[1].draw(self._seed, index, self._threads, brightness)
+
+    def _age_s(self, index: int) -> float:
+        """When a frame begins, since the camera was made."""
+        return self._started_s + index * self._period_s - self._made_s
 
     def _brightness(self, index: int) -> float:
         """The light of a frame; the same at every call."""

@@ -106,7 +106,7 @@ def solve_grid(
             break
         # The next level compiles first, and compilation cannot be interrupted.
         keeper.save(state, history, final=True)
-        state = _at_start(Unknowns(_multigrid(state.unknowns).refined(), *_others(state.unknowns)), settings)
+        state = _at_start(Unknowns(_multigrid(state.unknowns).refined(), state.unknowns.drift), settings)
     shape = _cubic(settings.cells + 1)
     return solution_of(state.unknowns, frame, shape, outcome, clock.elapsed_s, history)
 
@@ -120,8 +120,7 @@ def initial_unknowns(problem: Problem, frame: RoomFrame, settings: GridSettings)
     state = grid.of_fields((x, y, z), starting_flow(problem, frame, spans, settings.regime))
     levels = (*multigrid.levels[:-1], state)
     drift = jnp.zeros((len(problem.shifts), 4)) if moved(problem) else None
-    learned = jnp.zeros(2) if problem.scene.flow.transport == "learned" else None
-    return Unknowns(MultiGrid(levels, multigrid.grids), drift, learned)
+    return Unknowns(MultiGrid(levels, multigrid.grids), drift)
 
 
 def _cubic(n: int) -> tuple[int, int, int]:
@@ -196,10 +195,6 @@ def _at_start(unknowns: Unknowns, settings: GridSettings) -> GridState:
     return GridState(unknowns, scale, jnp.float32(settings.damping), jnp.int32(0), jnp.array(False))
 
 
-def _others(unknowns: Unknowns) -> tuple[Array | None, Array | None]:
-    return unknowns.drift, unknowns.log_transport
-
-
 def _record(step: NewtonStep, state: GridState, elapsed_s: float, settings: GridSettings) -> Row:
     cells, number = _multigrid(state.unknowns).finest.cells[0], int(state.step) + 1
     return {
@@ -264,7 +259,7 @@ class _Keeper:
         cells = int(found.header["shape"].get("cells", settings.coarsest))
         while _multigrid(state.unknowns).finest.cells[0] < cells:
             finer = _multigrid(state.unknowns).refined()
-            state = _at_start(Unknowns(finer, *_others(state.unknowns)), settings)
+            state = _at_start(Unknowns(finer, state.unknowns.drift), settings)
         return restore(found, state, configuration=self._configuration), history
 
     def save(self, state: GridState, history: list[Row], *, final: bool = False) -> None:

@@ -124,12 +124,7 @@ def initial_unknowns(
 ) -> Unknowns:
     """A random network from the loop's seed, and zeros for what else the scene asks for."""
     network = initial_mlp(settings.network, lower, upper, jax.random.key(settings.loop.seed))
-    learned = problem.scene.flow.transport == "learned"
-    return Unknowns(
-        network,
-        jnp.zeros((len(problem.shifts), 4)) if moved(problem) else None,
-        jnp.zeros(2) if learned else None,
-    )
+    return Unknowns(network, jnp.zeros((len(problem.shifts), 4)) if moved(problem) else None)
 
 
 def _lasting(settings: MlpSolveSettings) -> MlpSolveSettings:
