@@ -9,7 +9,7 @@ import pytest
 
 from drivers.aravis import AravisCamera, AravisRequest, list_aravis
 from drivers.errors import DeviceError, DeviceNotFoundError, DeviceSettingError, FrameError, FrameFault
-from tests.drivers.aravis.fake import ADDRESS, REQUEST, fake_camera, missing, opened
+from tests.drivers.aravis.fake import ADDRESS, REQUEST, fake_camera, missing, no_camera, opened
 
 pytestmark = missing
 
@@ -104,5 +104,8 @@ def test_it_is_listed_with_its_formats():
 
 
 def test_a_camera_that_is_away_is_said_to_be():
-    with pytest.raises(DeviceNotFoundError, match="There is no GigE Vision or USB3 Vision camera"):
+    with (
+        no_camera(),
+        pytest.raises(DeviceNotFoundError, match="There is no GigE Vision or USB3 Vision camera"),
+    ):
         AravisCamera(REQUEST)
