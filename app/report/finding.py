@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32
 
-from app.experiment.captures import CapturePair, load_capture
+from app.experiment.captures import CapturePair, load_capture, mean_capture
 from app.experiment.folder import Experiment, read_manifest
 from app.experiment.results import read_result
 from app.experiment.shift_files import read_shifts
@@ -65,7 +65,8 @@ def read_finding(experiment: Experiment, folder: Path) -> Finding:
         names = manifest["captures"]
         kept = experiment.captures_folder
         after = load_capture(kept / names["after"]) if "after" in names else None
-        return CapturePair(load_capture(kept / names["reference"]), load_capture(kept / names["flow"]), after)
+        flow, bursts = mean_capture([kept / name for name in manifest.get("bursts") or [names["flow"]]])
+        return CapturePair(load_capture(kept / names["reference"]), flow, after, bursts)
 
     solution = read_result(folder / "result.nc")
     return Finding(experiment, folder.name, manifest, solution, lambda: read_shifts(folder), captures)
