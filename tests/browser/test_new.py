@@ -160,6 +160,16 @@ def test_pictures_of_another_camera_are_brought_and_what_is_printed_is_a_pdf(
     expect(page.get_by_role("alert")).to_contain_text("The flow pictures have 64 x 48 px")
 
 
+def test_the_large_board_of_a_simulated_rig_is_printed_over_sheets(station: Station, opens: Opens):
+    page = opens(station.address).page
+    page.locator("button.next", has_text="Start a simulated rig").click()
+    page.get_by_role("button", name="Make a board").click()
+    made = page.locator("main p", has=page.get_by_role("link", name="Board (PDF)"))
+    expect(made).to_contain_text("15 sheets of A3, 1.20 × 0.90 m. Put them together at their marks")
+    expect(page.get_by_role("alert")).to_have_count(0)
+    snapshot(page, "board-over-sheets")
+
+
 def test_a_mistake_is_told_at_its_field_while_it_is_typed_and_can_be_undone(station: Station, opens: Opens):
     hand = chosen(station, opens)
     page = hand.page
