@@ -157,7 +157,7 @@ def test_pictures_of_another_camera_are_brought_and_what_is_printed_is_a_pdf(
     wrong = tmp_path / "small.png"
     cv2.imwrite(str(wrong), np.zeros((48, 64), np.uint8))
     page.get_by_label("Flow: the air moving").last.set_input_files(wrong)
-    page.get_by_role("button", name="Import 1 files").click()
+    page.get_by_role("button", name="Import 1 file").click()
     expect(page.get_by_role("alert")).to_contain_text("The flow pictures have 64 x 48 px")
 
 
