@@ -15,7 +15,6 @@ from app.experiment.results import read_result
 from app.experiment.shift_files import read_shifts
 from app.report.indoor import Indoor, indoor
 from app.report.maps import derived_maps
-from app.volume.comparison import truth_file
 from app.volume.file import RoomVolume, read_volume
 from app.volume.score import score_solution
 from core.problem import ShiftMeasurement
@@ -38,7 +37,7 @@ class Finding:
     @cached_property
     def truth(self) -> RoomVolume | None:
         """The room that a simulated rig looked at. Raises BadInputError."""
-        path = truth_file(self.experiment)
+        path = self.experiment.truth
         return None if path is None else read_volume(path)
 
     @cached_property
