@@ -419,7 +419,7 @@ def _check_objects(scene: Scene) -> None:
     for item in scene.objects:
         _check_inside(item, scene.room)
         for part in scene.boundary:
-            if isinstance(part, Inlet | Outlet) and _stands_before(item, part.patch, scene.room):
+            if isinstance(part, Inlet | Outlet) and stands_before(item, part.patch, scene.room):
                 raise SettingError(
                     f"The object {item.name!r} stands against the {part.kind} on {part.patch.wall} "
                     f"({part.patch.lower_m} to {part.patch.upper_m} m), so no air can pass there. Move one of them."
@@ -444,8 +444,8 @@ def _check_inside(item: RoomObject, room: Box) -> None:
             )
 
 
-def _stands_before(item: RoomObject, patch: Patch, room: Box) -> bool:
-    """Whether an object touches its wall over a part of the patch."""
+def stands_before(item: RoomObject, patch: Patch, room: Box) -> bool:
+    """Whether the object touches the patch's wall (within 1 mm) over a part of the patch."""
     face = face_of(patch.wall)
     side_m = (item.upper_m if face.upper else item.lower_m)[face.axis]
     if abs(side_m - face.place_m(room)) > 1e-3:

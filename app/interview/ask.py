@@ -64,6 +64,22 @@ def ask_either(tree: Tree, parent: Path, text: str, ways: Sequence[tuple[str, st
     return name
 
 
+def ask_position(tree: Tree, path: Path, name: str) -> Asked:
+    """Ask for the x, y and z [m] of the thing at `path`."""
+    for axis in range(3):
+        yield from ask_field(tree, (*path, "position", axis), f"{name}: {'xyz'[axis]}", "m")
+
+
+def ask_temperature(tree: Tree, path: Path, name: str, deviation: str, can_be_open: bool = False) -> Asked:
+    """Ask for the temperature [C] of the thing at `path` and, unless it stays open, for its deviation [K]."""
+    yield from ask_field(tree, (*path, "temperature"), f"{name}: temperature", "C", can_be_open)
+    if value_at(tree, (*path, "temperature")) is not None:
+        value_at(tree, path).setdefault("temperature_deviation", deviation)
+        yield from ask_field(
+            tree, (*path, "temperature_deviation"), f"{name}: temperature, give or take", "K"
+        )
+
+
 def ask_choice(text: str, options: Sequence[str], default: str = "", about: Sequence[str] = ()) -> Asked:
     """Ask for one of the options, by its number or its name; return its name. `about` says more of each."""
 

@@ -1,11 +1,20 @@
-"""What is asked about the room: its size, what blows, warms and cools in it, and what measures."""
+"""What is asked about the room: its size, what blows, warms and cools in it, what stands in it, what measures."""
 
 import copy
 from collections.abc import Callable
 
 from app.files.toml_places import Path
-from app.interview.ask import Asked, ask_choice, ask_count, ask_either, ask_field
+from app.interview.ask import (
+    Asked,
+    ask_choice,
+    ask_count,
+    ask_either,
+    ask_field,
+    ask_position,
+    ask_temperature,
+)
 from app.interview.conversation import Again
+from app.interview.objects import ask_object
 from app.interview.tree import Tree, put, sentence_at, value_at
 from core.geometry import WALLS, face_of
 
@@ -24,6 +33,7 @@ _FRESH: dict[str, Tree] = {
     "outlet": {"wall": "x_max", **_CORNERS},
     "surface": {"wall": "x_max", "lower": ["1 m", "0.2 m"], "upper": ["2 m", "0.8 m"], "temperature": "40 C"},
     "wall": {"wall": "z_max", "temperature": "20 C"},
+    "object": {"kind": "seated_person", "position": ["1 m", "1 m", "0 m"]},
     "thermometer": {"position": ["1 m", "1 m", "1 m"], "temperature": "20 C"},
     "anemometer": {"position": ["1 m", "1 m", "1 m"], "velocity": ["0.1 m/s", "0 m/s", "0 m/s"]},
 }
@@ -39,6 +49,7 @@ _COUNTED = {
     "outlet": "How many outlets let air out",
     "surface": "How many warm or cold surfaces (radiators, windows)",
     "wall": "How many whole walls of which something is known",
+    "object": "How many people and pieces of furniture stand in the room",
     "thermometer": "How many thermometers in the air",
     "anemometer": "How many anemometers in the air",
 }
@@ -98,33 +109,23 @@ def _ask_wall(tree: Tree, path: Path, name: str) -> Asked:
     put(tree, (*path, "wall"), wall)
 
 
-def _ask_temperature(tree: Tree, kind: str, path: Path, name: str, can_be_open: bool = False) -> Asked:
-    yield from ask_field(tree, (*path, "temperature"), f"{name}: temperature", "C", can_be_open)
-    if value_at(tree, (*path, "temperature")) is not None:
-        thing = value_at(tree, path)
-        thing.setdefault("temperature_deviation", _DEVIATIONS[kind])
-        yield from ask_field(
-            tree, (*path, "temperature_deviation"), f"{name}: temperature, give or take", "K"
-        )
-
-
 def _ask_supply(tree: Tree, kind: str, path: Path, name: str) -> Asked:
     yield from _ask_opening(tree, path, name)
     ways = (("flow", "m3/h"), ("speed", "m/s"))
     yield from ask_either(tree, path, f"{name}: flow (120 m3/h) or mean speed (0.5 m/s)", ways)
     value_at(tree, path).setdefault("deviation", "5 %")
     yield from ask_field(tree, (*path, "deviation"), f"{name}: flow, give or take", "%")
-    yield from _ask_temperature(tree, kind, path, name)
+    yield from ask_temperature(tree, path, name, _DEVIATIONS[kind])
 
 
 def _ask_outlet(tree: Tree, kind: str, path: Path, name: str) -> Asked:
     yield from _ask_opening(tree, path, name)
-    yield from _ask_temperature(tree, kind, path, name, can_be_open=True)
+    yield from ask_temperature(tree, path, name, _DEVIATIONS[kind], can_be_open=True)
 
 
 def _ask_surface(tree: Tree, kind: str, path: Path, name: str) -> Asked:
     yield from _ask_opening(tree, path, name)
-    yield from _ask_temperature(tree, kind, path, name)
+    yield from ask_temperature(tree, path, name, _DEVIATIONS[kind])
 
 
 def _ask_whole_wall(tree: Tree, kind: str, path: Path, name: str) -> Asked:
@@ -140,25 +141,20 @@ def _ask_whole_wall(tree: Tree, kind: str, path: Path, name: str) -> Asked:
     else:
         thing.pop("adiabatic", None)
         thing.setdefault("temperature", "20 C")
-        yield from _ask_temperature(tree, kind, path, name)
+        yield from ask_temperature(tree, path, name, _DEVIATIONS[kind])
 
 
 def _ask_thermometer(tree: Tree, kind: str, path: Path, name: str) -> Asked:
-    yield from _ask_position(tree, path, name)
-    yield from _ask_temperature(tree, kind, path, name)
+    yield from ask_position(tree, path, name)
+    yield from ask_temperature(tree, path, name, _DEVIATIONS[kind])
 
 
 def _ask_anemometer(tree: Tree, kind: str, path: Path, name: str) -> Asked:
-    yield from _ask_position(tree, path, name)
+    yield from ask_position(tree, path, name)
     for axis in range(3):
         yield from ask_field(tree, (*path, "velocity", axis), f"{name}: speed along {'xyz'[axis]}", "m/s")
     value_at(tree, path).setdefault("deviation", "0.05 m/s")
     yield from ask_field(tree, (*path, "deviation"), f"{name}: speed, give or take", "m/s")
-
-
-def _ask_position(tree: Tree, path: Path, name: str) -> Asked:
-    for axis in range(3):
-        yield from ask_field(tree, (*path, "position", axis), f"{name}: {'xyz'[axis]}", "m")
 
 
 _ASK: dict[str, Callable[[Tree, str, Path, str], Asked]] = {
@@ -166,6 +162,7 @@ _ASK: dict[str, Callable[[Tree, str, Path, str], Asked]] = {
     "outlet": _ask_outlet,
     "surface": _ask_surface,
     "wall": _ask_whole_wall,
+    "object": ask_object,
     "thermometer": _ask_thermometer,
     "anemometer": _ask_anemometer,
 }

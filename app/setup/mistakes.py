@@ -26,8 +26,9 @@ from app.setup.answers import (
     WallAnswer,
 )
 from app.setup.units import Size
-from core.geometry import Vector3, face_of
-from core.objects import ready_object, shared_m
+from core.geometry import Box, Vector3, face_of
+from core.objects import RoomObject, ready_object, shared_m
+from core.scene import Patch, stands_before
 
 # Faster than any supply of a room.
 FASTEST_M_S = 50.0
@@ -97,7 +98,9 @@ def _contradictions(parts: Parts) -> list[Said]:
         _too_fast,
         _behind_the_wall,
         _outside_the_room,
+        _objects_outside,
         _objects_apart,
+        _objects_before_openings,
         _wall_twice,
     )
     return [said for check in checks for said in check(parts)]
@@ -209,25 +212,56 @@ def _outside_the_room(parts: Parts) -> Iterator[Said]:
                 )
 
 
-def _objects_apart(parts: Parts) -> Iterator[Said]:
-    """Objects that reach through a wall, or into one another."""
-    room_m: Vector3 | None = parts.get(("room",))
-    boxes = [
+def _boxes(parts: Parts) -> list[tuple[Path, RoomObject]]:
+    return [
         (path, ready_object(item.kind, item.kind, item.position, item.size))
         for path, item in _named(parts, "object")
     ]
-    for path, box in boxes if room_m else ():
+
+
+def _objects_outside(parts: Parts) -> Iterator[Said]:
+    """Objects that reach through a wall, or are larger than the room."""
+    room_m: Vector3 | None = parts.get(("room",))
+    for path, box in _boxes(parts) if room_m else ():
         for axis, length_m in enumerate(room_m or ()):
-            low_m, high_m = box.lower_m[axis], box.upper_m[axis]
-            if low_m < -1e-9 or high_m > length_m + 1e-9:
+            low_m, high_m, letter = box.lower_m[axis], box.upper_m[axis], "xyz"[axis]
+            if box.size_m[axis] > length_m + 1e-9:
+                field = ("kind",) if parts[path].size is None else ("size", axis)
+                yield Said(
+                    (*path, *field),
+                    f"it is {box.size_m[axis]:g} m long along {letter}, more than the room's {length_m:g} m."
+                    f"{_millimetres(box.size_m[axis], length_m)}",
+                )
+            elif low_m < -1e-9 or high_m > length_m + 1e-9:
                 yield Said(
                     (*path, "position", axis),
-                    f"it reaches from {low_m:g} to {high_m:g} m along {'xyz'[axis]}; the room is 0 to {length_m:g} m "
+                    f"it reaches from {low_m:g} to {high_m:g} m along {letter}; the room is 0 to {length_m:g} m "
                     f"there.{_millimetres(high_m, length_m)} `position` is the middle of its foot.",
                 )
-    for (path, one), (later, other) in combinations(boxes, 2):
+
+
+def _objects_apart(parts: Parts) -> Iterator[Said]:
+    """Objects that reach into one another."""
+    for (path, one), (later, other) in combinations(_boxes(parts), 2):
         if min(shared_m(one, other)) > 1e-9:
             yield Said(later, f"it stands in {path[0]} {int(path[1]) + 1}. Move one of them.")
+
+
+def _objects_before_openings(parts: Parts) -> Iterator[Said]:
+    """Objects that stand against a supply or an outlet."""
+    room_m: Vector3 | None = parts.get(("room",))
+    if room_m is None:
+        return
+    room = Box(lower_m=(0.0, 0.0, 0.0), upper_m=room_m)
+    for path, box in _boxes(parts):
+        for place, item in _named(parts, "supply", "outlet"):
+            sound = all(low < high for low, high in zip(item.lower, item.upper, strict=True))
+            if sound and stands_before(box, Patch(wall=item.wall, lower_m=item.lower, upper_m=item.upper), room):
+                yield Said(
+                    path,
+                    f"it stands against {place[0]} {int(place[1]) + 1} on {item.wall}, so no air can pass there. "
+                    "Move one of them.",
+                )
 
 
 def _wall_twice(parts: Parts) -> Iterator[Said]:

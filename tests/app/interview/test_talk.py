@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import BadInputError
+from app.experiment.folder import open_experiment
 from app.files.toml import toml_data
 from app.interview.conversation import DRAFT_FILE, Piped
 from app.interview.questions import Inventory
@@ -57,6 +58,7 @@ x_max
 0.1
 0.3
 none
+0
 0
 0
 1
@@ -169,6 +171,69 @@ def test_an_outlet_on_a_supply_is_asked_for_again_as_a_whole(tmp_path):
     assert answers["outlet"][0]["wall"] == "x_max"
 
 
+# In place of "no objects": a ready one, and a box of its own size and heat.
+NO_OBJECTS, OBJECTS = "none\n0\n0\n0\n", "none\n0\n0\n{}"
+PERSON, BOX = "seated_person\n2\n1\n0\n", "box\n50 cm\n0.4\n30 cm\n1\n2.5\n0.2 m\n"
+
+
+@pytest.mark.parametrize(
+    ("heat", "known", "thermal"),
+    [
+        ("adiabatic\n", {}, "adiabatic"),
+        ("temperature\n35\n1 K\n", {"temperature": "35 C", "temperature_deviation": "1 K"}, "temperature"),
+        ("heat\n120\n20 W\n", {"heat": "120 W", "heat_deviation": "20 W"}, "power"),
+        ("heat\n-0.05 kW\n\n", {"heat": "-0.05 kW", "heat_deviation": "15 W"}, "power"),
+    ],
+)
+def test_a_person_and_a_box_are_asked_with_what_is_known_of_them(heat, known, thermal, tmp_path):
+    answers, script = answered(
+        tmp_path / "lab", changed(NO_OBJECTS, OBJECTS.format(f"2\n{PERSON}{BOX}{heat}"))
+    )
+    assert script.refused == []
+    person, box = answers["object"]
+    assert person == {"kind": "seated_person", "position": ["2 m", "1 m", "0 m"]}
+    place = {"position": ["1 m", "2.5 m", "0.2 m"], "size": ["50 cm", "0.4 m", "30 cm"]}
+    assert box == {"kind": "box"} | place | known
+    kept = open_experiment(tmp_path / "lab").settings.scene.objects
+    assert [item.name for item in kept] == ["seated person 1", "box 2"]
+    assert kept[1].thermal == thermal
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("seated_person", "piano\nseated_person", "none of them"),
+        ("\n2\n1\n0\n", "\n20\n2\n1\n0\n", "reaches from 19.8 to 20.2 m along x"),
+        ("\n2\n1\n0\n", "\n2\n1\n2 m\n0\n", "reaches from 2 to 3.2 m along z"),
+        ("50 cm", "50 m\n50 cm", "more than the room's 4 m"),
+        ("50 cm", "5 W\n50 cm", "no unit of length"),
+        ("120", "120 K\n120", "no unit of power"),
+        ("20 W", "0 W\n20 W", "A deviation is 0.1 W"),
+        # A whole object again: it stands in the person, or against the supply.
+        ("box", "box\n\n\n\n2\n1\n\n\nbox", "it stands in object 1"),
+        ("box", "box\n\n\n\n0.25\n1.5\n2.2\n\nbox", "it stands against supply 1 on x_min"),
+    ],
+)
+def test_a_wrong_answer_on_an_object_is_told_at_once_and_asked_again(old, new, sentence, tmp_path):
+    objects = f"2\n{PERSON}{BOX}heat\n120\n20 W\n"
+    text = changed(NO_OBJECTS, OBJECTS.format(changed(old, new, objects)))
+    answers, script = answered(tmp_path / "lab", text)
+    assert len(script.refused) == 1
+    assert sentence in script.refused[0]
+    right, _ = answered(tmp_path / "right", changed(NO_OBJECTS, OBJECTS.format(objects)))
+    assert answers == right
+
+
+def test_a_ready_one_that_is_larger_than_the_room_is_chosen_again(tmp_path):
+    low = changed("270 cm", "170 cm").replace("2.3\n2.5\n", "1.3\n1.5\n")
+    answers, script = answered(
+        tmp_path / "lab", changed(NO_OBJECTS, OBJECTS.format("1\nstanding_person\ndesk\n2\n1\n0\n"), low)
+    )
+    assert len(script.refused) == 1
+    assert "it is 1.75 m long along z, more than the room's 1.7 m" in script.refused[0]
+    assert answers["object"][0]["kind"] == "desk"
+
+
 def test_back_asks_the_question_before_again(tmp_path):
     answers, _ = answered(tmp_path / "lab", changed("A lab\n4 m\n3\n", "A lab\n4 m\nback\n5 m\n3 m\n"))
     assert answers["room"][:2] == ["5 m", "3 m"]
@@ -233,6 +298,7 @@ def test_a_real_pipe_makes_the_experiment_and_a_wrong_line_says_its_number(tmp_p
     assert {key: made[key] for key in ("room", "air", "camera")} == {
         k: packaged[k] for k in ("room", "air", "camera")
     }
+    assert "object" not in made
     wrong = subprocess.run(
         [*AIRLENS, "other"],
         input="simulated\nsample\n\n4 ells\n",
@@ -243,6 +309,46 @@ def test_a_real_pipe_makes_the_experiment_and_a_wrong_line_says_its_number(tmp_p
     )
     assert wrong.returncode == 2
     assert "line 4, the answer to 'Length along x': 'ells' is no unit of length" in wrong.stderr
+
+
+def test_a_real_pipe_makes_a_room_with_a_person_and_a_box(tmp_path):
+    before = "simulated\n" + "\n" * _defaults_before("How many people", tmp_path / "count")
+    objects = "2\nseated_person\n2 m\n1 m\n0 m\nbox\n0.5\n0.5\n0.3\n1\n2.5\n0\nheat\n120\n20\n"
+    done = subprocess.run(
+        [*AIRLENS, "lab"],
+        input=before + objects + 100 * "\n",
+        text=True,
+        capture_output=True,
+        cwd=tmp_path,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    person, box = open_experiment(tmp_path / "lab").settings.scene.objects
+    assert (person.name, person.power_w) == ("seated person 1", 75.0)
+    assert (box.name, box.power_w, box.power_std_w) == ("box 2", 120.0, 20.0)
+
+
+def _defaults_before(question: str, folder: Path) -> int:
+    """How many questions come between the camera and this one, in the packaged room."""
+    with pytest.raises(_FoundError) as found:
+        talk(folder, _Counting(question), lambda: inventory(cameras=(SIMULATED,)))
+    return found.value.args[0] - 1
+
+
+class _FoundError(Exception):
+    """So many questions were asked before the one that is looked for."""
+
+
+class _Counting(Piped):
+    def __init__(self, question: str) -> None:
+        super().__init__(lambda: "\n")
+        self.question, self.asked = question, 0
+
+    def hear(self, question):
+        if question.text.startswith(self.question):
+            raise _FoundError(self.asked)
+        self.asked += 1
+        return super().hear(question)
 
 
 def test_a_pipe_as_a_file_is_read(tmp_path):

@@ -86,6 +86,12 @@ WRONG: list[tuple[Keys, Any, str, str]] = [
         r"reaches from -0.1 to 0.3 m along x; the room is 0 to",
     ),
     (("object",), [PERSON, PERSON], "object[1]", r"it stands in object 1"),
+    (
+        ("object",),
+        [PERSON | {"size": ["0.4 m", "0.4 m", "12 m"]}],
+        "object[0].size[2]",
+        r"it is 12 m long along z, more than the room's",
+    ),
     # What contradicts itself.
     (("outlet",), GONE, "supply", r"1 supplies and 0 outlets: air that comes in must leave"),
     (("supply",), GONE, "outlet", r"0 supplies and 1 outlets"),
