@@ -30,7 +30,9 @@ def with_short_mean(
             f"that of a long time. Take {LEAST_BURSTS} or more."
         )
     found = short_mean(*_departures(shift, captures, view, variance))
-    return replace(shift, short_mean_px=found.modes_px), _told(found, captures)
+    if found.rms_px > 0.0:
+        shift = replace(shift, short_mean_px=found.modes_px)
+    return shift, _told(found, captures)
 
 
 def _departures(

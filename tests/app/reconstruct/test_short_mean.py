@@ -82,6 +82,13 @@ def test_one_burst_is_measured_as_it_is_and_two_say_that_they_are_too_few(tmp_pa
     assert "too few" in two.notes[0]
 
 
+def test_air_that_stands_still_has_a_mean_without_such_an_error(tmp_path):
+    _, still = measured(tmp_path / "still", 6, moves_px=(0.02,) * 6)
+    (shift,) = still.shifts
+    assert shift.short_mean_px is None or np.abs(shift.short_mean_px).max() < 1e-3
+    assert "mean of 6 bursts" in still.notes[0]
+
+
 def test_a_result_keeps_the_error_of_its_mean(tmp_path):
     _, whole = measured(tmp_path / "sequence", len(MOVES_PX))
     write_shifts(tmp_path, whole.shifts)
