@@ -2,7 +2,7 @@
 
 import re
 
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 from app.client import Client
 from tests.browser.conftest import Opens, Station
@@ -62,3 +62,27 @@ def test_a_phone_shows_one_column_and_the_next_step(station: Station, opens: Ope
         box = page.locator("button.next").bounding_box()
         assert box["x"] >= 0, title
         assert box["x"] + box["width"] <= 390, title
+
+
+def test_a_page_chosen_before_the_first_answers_stays(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment("A room", camera_px=64).experiment
+    keep(station.app.state.services.folders.open(name), "20260101T000000-standard", room(), "standard", 1.0)
+    page = opens(station.address).page
+    expect(page.locator("main")).to_have_attribute("aria-label", "Look")
+    held: list[Route] = []
+
+    def hold_the_first(route: Route) -> None:
+        if held:
+            route.continue_()
+        else:
+            held.append(route)
+
+    page.route(re.compile(r"/experiments$"), hold_the_first)
+    page.goto(page.url.split("#")[0].rstrip("/") + "/?again")
+    page.get_by_role("button", name="Rig", exact=True).click()
+    while not held:
+        page.wait_for_timeout(20)
+    held[0].continue_()
+    expect(page.get_by_label("Experiment")).to_have_value(name)
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")

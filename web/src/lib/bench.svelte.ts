@@ -67,6 +67,8 @@ class Bench {
 
   private stream: EventSource | null = null;
   private pending = new Set<string>();
+  /** The operator has chosen a page: the first answers no longer choose one. */
+  private turned = false;
   private again: (() => Promise<unknown>) | null = null;
 
   /** The experiment that actions are about. */
@@ -88,7 +90,7 @@ class Bench {
       await openSession();
       const named = this.read(location.hash);
       await this.refresh();
-      if (!named && this.result) this.page = "Look";
+      if (!named && !this.turned && this.result) this.page = "Look";
       this.listen();
       this.opened = true;
     });
@@ -176,6 +178,11 @@ class Bench {
     if (this.page === "New") return "#/new";
     const parts = [this.page.toLowerCase(), this.experiment, this.page === "Look" ? this.result : null];
     return `#/${parts.flatMap((part) => (part ? [encodeURIComponent(part)] : [])).join("/")}`;
+  }
+
+  /** Turns to a page, as the operator asked. */
+  turn(page: Page): void {
+    [this.turned, this.page] = [true, page];
   }
 
   /** Goes to an address that `place` gave. */
