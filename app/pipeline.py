@@ -4,6 +4,7 @@ import json
 import math
 import time
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from app.reconstruct.measure import Measurement, measure
 from app.reconstruct.presets import AUTO, check_data_term, resolved, solved
 from app.reconstruct.presets import preset as preset_called
 from app.reconstruct.problem import known_of, problem_of
+from app.reconstruct.sequence import check_sequence, with_departures
 from app.report.finding import Finding
 from app.report.page import write_report
 from core.problem import Problem
@@ -52,10 +54,13 @@ def reconstruct(
     folder: Path,
     preset: str = AUTO,
     *,
+    sequence: bool = False,
     watch: Watch = Watch(),
     into: Path | None = None,
 ) -> Reconstruction:
     """Reconstruct the newest captures of an experiment. Raises BadInputError, SettingError, StoppedError.
+
+    With `sequence` the temperature of each burst of the newest flow is found as well, as a departure from the mean.
 
     The result goes to a new folder among the experiment's results, or to `into`, which exists. A solver keeps in
     `watch.store` what it can go on from; one that finds there another problem's, or other settings', starts afresh.
@@ -74,6 +79,8 @@ def reconstruct(
     check_data_term(preset, known.scene)
     on_stage("read the captures")
     captures = newest_pair(experiment)
+    if sequence:
+        check_sequence(captures)
     on_stage("measure the shift of the pattern")
     measurement = measure(captures, known.scene)
     problem = problem_of(known, measurement.shifts, measurement.images)
@@ -81,6 +88,8 @@ def reconstruct(
     checked = rendered_agreement(known.scene, captures.reference)
     on_stage(f"solve ({preset})")
     solution = solved(solve, problem, watch)
+    if sequence:
+        solution = with_departures(solution, known.scene, measurement, watch)
     on_stage("keep the result")
     told = [known.optics, *aged(experiment, captures), *measurement.notes, checked, *solution.notes]
     result = into or _new_folder(experiment, preset)
@@ -143,6 +152,7 @@ def _keep(folder: Path, finding: Finding, measurement: Measurement) -> None:
             "title": finding.experiment.settings.title,
             "preset": manifest["preset"],
             "assumed": "\n".join(manifest["assumed"]),
+            "began": _began(measurement),
         },
         finding.derived,
     )
@@ -150,6 +160,14 @@ def _keep(folder: Path, finding: Finding, measurement: Measurement) -> None:
     lines = (json.dumps({name: _told(value) for name, value in row.items()}) for row in solution.history)
     write_text(folder / "history.jsonl", "".join(line + "\n" for line in lines))
     write_manifest(folder, dict(manifest))
+
+
+def _began(measurement: Measurement) -> str:
+    """The moment of the first burst in UTC, as CF writes it."""
+    captures = measurement.captures
+    first = captures.bursts[0].manifest if captures.bursts else captures.flow.manifest
+    moment = datetime.fromisoformat(str(first["created"])).astimezone(UTC)
+    return moment.strftime("%Y-%m-%d %H:%M:%S")
 
 
 def _reported(finding: Finding, folder: Path) -> str:

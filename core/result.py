@@ -26,12 +26,40 @@ class Outcome(Enum):
     )
 
 
+class Departures(eqx.Module):
+    """T of every burst of a sequence less that of their mean, on the vertices of the mean's solution [K].
+
+    `time_s` is when each burst began. The deviation is one sigma, the same for every burst, and does not hold the
+    mean's. `field_std_k` and `field_length_m` are those of the random field that the departures were taken from.
+    """
+
+    time_s: Float[np.ndarray, " bursts"]
+    temperature_k: Float[np.ndarray, "bursts nx ny nz"]
+    temperature_std_k: Float[np.ndarray, "nx ny nz"]
+    field_std_k: float = eqx.field(static=True)
+    field_length_m: float = eqx.field(static=True)
+
+    def without(self, inside: Bool[np.ndarray, "nx ny nz"]) -> "Departures":
+        """The same with NaN at these vertices."""
+        return replace(
+            self,
+            temperature_k=np.where(inside, np.nan, self.temperature_k).astype(np.float32),
+            temperature_std_k=np.where(inside, np.nan, self.temperature_std_k).astype(np.float32),
+        )
+
+    @property
+    def rms_k(self) -> Float[np.ndarray, "nx ny nz"]:
+        """How much T fluctuates from burst to burst: what was found, and what may be more by the deviation."""
+        return np.sqrt((self.temperature_k**2).mean(axis=0) + self.temperature_std_k**2)
+
+
 class Solution(eqx.Module):
     """T, p, u on vertices (end planes included), index order [ix, iy, iz]; None where not solved for.
 
     Standard deviations are one sigma, on the same grid; `informed` is the share of the prior variance of
-    T that the measurements removed (0: the model speaks alone). `history` holds one dict a recorded
-    iteration: numbers, and in `doing` what was done. All fields are NaN in and on objects, which hold no air.
+    T that the measurements removed (0: the model speaks alone). `departures` are those of the bursts of a sequence,
+    of which the solution is the mean. `history` holds one dict a recorded iteration: numbers, and in `doing` what was
+    done. All fields are NaN in and on objects, which hold no air.
     """
 
     x_m: Float[np.ndarray, " nx"]
@@ -44,6 +72,7 @@ class Solution(eqx.Module):
     pressure_std_m2_s2: Float[np.ndarray, "nx ny nz"] | None = None
     velocity_std_m_s: Float[np.ndarray, "nx ny nz 3"] | None = None
     informed: Float[np.ndarray, "nx ny nz"] | None = None
+    departures: Departures | None = None
     outcome: Outcome = eqx.field(static=True, default=Outcome.converged)
     solver_s: float = 0.0
     history: tuple[Mapping[str, float | str], ...] = eqx.field(static=True, default=())
@@ -67,7 +96,8 @@ class Solution(eqx.Module):
                 field.dtype
             )
 
-        return replace(self, **{name: masked(getattr(self, name)) for name in _FIELDS})
+        fields = {name: masked(getattr(self, name)) for name in _FIELDS}
+        return replace(self, departures=self.departures and self.departures.without(inside), **fields)
 
     def filled(self) -> "Solution":
         """For what needs a number everywhere: in objects the nearest air's values, and no velocity."""

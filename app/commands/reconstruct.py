@@ -38,6 +38,9 @@ def reconstruct(
             "supply are stated, else draft.",
         ),
     ] = "auto",
+    sequence: Annotated[
+        bool, typer.Option("--sequence", help="Find the temperature of each burst of a sequence as well.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Reconstruct the air from the newest reference and flow captures. Ctrl-C stops; the same command goes on."""
@@ -52,7 +55,7 @@ def reconstruct(
         typer.echo(f"Going on from {kept}, where captures and settings are the same.", err=True)
     try:
         with _progress(quiet=as_json) as told, _interruptible() as stop:
-            done = run(experiment, preset, watch=Watch(told, stop.is_set, store))
+            done = run(experiment, preset, sequence=sequence, watch=Watch(told, stop.is_set, store))
     except StoppedError:
         typer.echo(f"Stopped. What was done is kept in {kept}; the same command goes on from it.", err=True)
         raise typer.Exit(130) from None

@@ -29,7 +29,7 @@ def report(
 def export(
     experiment: Annotated[Path, typer.Argument(help="Experiment folder.")],
     kind: Annotated[
-        Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf"],
+        Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf", "pvd"],
         typer.Option(
             "--format",
             help="zip is an OpenFOAM case, ply a surface of one temperature, vtu paths of particles, pdf the report.",

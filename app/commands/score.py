@@ -50,6 +50,17 @@ def score_table(scores: dict[str, Any]) -> Table:
     held = {"T": scores["T_within"], "u": scores["u_within"], "p": scores["p_within"]}
     told = ", ".join(f"{name} {100 * share:.0f} %" for name, share in held.items() if share is not None)
     table.add_row("points within their 95 % intervals", told or "-", "wanted: 90 to 98 %")
+    bursts = scores["bursts"]
+    if bursts is not None:
+        table.add_row(
+            "temperature of a burst, rms",
+            f"{bursts['rms_K']:.3f} K",
+            f"the mean {bursts['mean_rms_K']:.3f} K",
+        )
+        table.add_row("departures from the mean, relative", _number(bursts["departure_rel"]), "the mean 1")
+        table.add_row(
+            "of bursts within their 95 % intervals", f"T {100 * bursts['within']:.0f} %", "wanted: 90 to 98 %"
+        )
     table.add_row("solver", f"{scores['solver_s']:.1f} s", f"outcome {scores['outcome']}")
     return table
 

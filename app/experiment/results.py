@@ -9,7 +9,7 @@ import xarray as xr
 
 from app.files.durable import durable_path
 from app.files.reading import reading
-from core.result import Derived, Outcome, Solution
+from core.result import Departures, Derived, Outcome, Solution
 
 _DIMS = ("x", "y", "z")
 # The mark of a variable that follows from T and u.
@@ -32,7 +32,8 @@ _VECTORS = {
 def to_dataset(solution: Solution, attributes: dict[str, str], derived: Sequence[Derived] = ()) -> xr.Dataset:
     """The solution as a CF dataset: coordinates x, y, z [m]; T [K], p [m2 s-2], u, v, w [m s-1].
 
-    Each of `derived` is there by its name, the ends of its interval as NAME_low and NAME_high.
+    The bursts of a sequence are along `time` [s]: T_departure is T in a burst less the mean's. Each of `derived` is
+    there by its name, the ends of its interval as NAME_low and NAME_high.
     """
     coordinates = {
         axis: (
@@ -58,6 +59,9 @@ def to_dataset(solution: Solution, attributes: dict[str, str], derived: Sequence
         for ending, long, values in _ends(one):
             names = {"units": one.unit, "long_name": long, "source": _DERIVED}
             variables[one.name + ending] = (_DIMS, np.asarray(values, np.float32), names)
+    if solution.departures is not None:
+        coordinates["time"] = _time(solution.departures, attributes.get("began", ""))
+        variables |= _in_time(solution.departures)
     notes = {
         "Conventions": "CF-1.11",
         "outcome": solution.outcome.name,
@@ -65,6 +69,52 @@ def to_dataset(solution: Solution, attributes: dict[str, str], derived: Sequence
         "notes": "\n".join(solution.notes),
     }
     return xr.Dataset(variables, coordinates, notes | attributes)
+
+
+def _time(found: Departures, began: str) -> tuple[str, np.ndarray, dict[str, str]]:
+    """The time axis of a sequence: CF's where the moment at which it began is told."""
+    units = f"seconds since {began}" if began else "s"
+    names = {"units": units, "axis": "T", "long_name": "time at which a burst began"}
+    return "time", np.asarray(found.time_s, np.float64), names | ({"standard_name": "time"} if began else {})
+
+
+def _in_time(found: Departures) -> dict[str, Any]:
+    every, once = ("time", *_DIMS), _DIMS
+    return {
+        "T_departure": (
+            every,
+            np.asarray(found.temperature_k, np.float32),
+            {"units": "K", "long_name": "temperature of a burst less that of the mean, T"},
+        ),
+        "T_departure_std": (
+            once,
+            np.asarray(found.temperature_std_k, np.float32),
+            {
+                "units": "K",
+                "long_name": "standard deviation of T_departure, of every burst alike",
+                "field_std_k": found.field_std_k,
+                "field_length_m": found.field_length_m,
+            },
+        ),
+        "T_rms": (
+            once,
+            np.asarray(found.rms_k, np.float32),
+            {"units": "K", "long_name": "fluctuation of the temperature from burst to burst, rms"},
+        ),
+    }
+
+
+def _departures(data: xr.Dataset) -> Departures | None:
+    if "T_departure" not in data:
+        return None
+    about = data["T_departure_std"].attrs
+    return Departures(
+        time_s=data["time"].to_numpy().astype(np.float64),
+        temperature_k=data["T_departure"].to_numpy(),
+        temperature_std_k=data["T_departure_std"].to_numpy(),
+        field_std_k=float(about["field_std_k"]),
+        field_length_m=float(about["field_length_m"]),
+    )
 
 
 def _ends(one: Derived) -> list[tuple[str, str, np.ndarray]]:
@@ -90,7 +140,7 @@ def write_result(
 def read_result(path: Path) -> Solution:
     """Read result.nc. Raises BadInputError for a file that is not one."""
     with reading(path, "Reconstruct again, or give a result.nc."):
-        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as dataset:
             data = dataset.load()
         fields: dict[str, Any] = {
             name: data[entry[0]].to_numpy() if entry[0] in data else None for name, entry in _VOLUMES.items()
@@ -108,6 +158,7 @@ def read_result(path: Path) -> Solution:
             outcome=Outcome[str(data.attrs["outcome"])],
             solver_s=float(data.attrs["solver_s"]),
             notes=tuple(str(data.attrs["notes"]).splitlines()),
+            departures=_departures(data),
             **fields,
         )
 

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Bool, Float, Float32
 from scipy.ndimage import uniform_filter
 
 from app.errors import BadInputError
-from app.experiment.captures import Capture, CapturePair
+from app.experiment.captures import Capture, CapturePair, load_capture
 from app.reconstruct.cover import covered_windows
 from app.reconstruct.drift import Agreement, Exposures, agreement, mount, without_known_drift
 from app.reconstruct.pair import check_pair
@@ -21,14 +21,17 @@ from core.scene import Scene, View
 from core.window_fit import derivative_filter
 
 Image = Float32[np.ndarray, "rows cols"]
+Mask = Bool[np.ndarray, " windows"]
 
 
 @dataclass(frozen=True)
 class Measurement:
     """What two captures say: the shift of every view, with the captures it was measured on.
 
-    `images` are what a data term of single pixels compares: the reference, moved by the drift, and the flow.
-    They are there only where the scene asks for such a term. `notes` tell how the drift was found.
+    `bursts` tell, for each burst of a sequence and each view, how the pattern moved from the mean of all; there are
+    none of a single burst. `images` are what a data term of single pixels compares: the reference, moved by the
+    drift, and the flow. They are there only where the scene asks for such a term. `notes` tell how the drift was
+    found.
     """
 
     captures: CapturePair
@@ -36,25 +39,27 @@ class Measurement:
     drifts: tuple[Similarity, ...]
     notes: tuple[str, ...]
     images: tuple[ImagePair, ...] = ()
+    bursts: tuple[tuple[ShiftMeasurement, ...], ...] = ()
 
 
 def measure(captures: CapturePair, scene: Scene) -> Measurement:
     """Measure every view of a reference and a flow. Raises BadInputError, SettingError."""
     reference, flow = captures.reference, captures.flow
     _check_captures(reference, flow, scene)
-    shifts, drifts, notes = [], [], []
+    shifts, drifts, notes, views = [], [], [], []
     for index, view in enumerate(scene.views):
         shift, drift, note = _measure_view(scene, index, view, captures)
-        shift, averaged = with_short_mean(
-            shift, captures, index, lambda one, n=index, v=view: _variance(one, n, v)
-        )
+        bursts = _burst_shifts(scene, index, captures, shift)
+        shift, averaged = with_short_mean(shift, bursts, captures)
+        views.append(bursts)
         shifts.append(shift)
         drifts.append(drift)
         notes.append(note + averaged)
     images: tuple[ImagePair, ...] = ()
     if scene.solve.data_term == "warped":
         images = tuple(_pair(view, n, captures, drifts[n]) for n, view in enumerate(scene.views))
-    return Measurement(captures, tuple(shifts), tuple(drifts), tuple(notes), images)
+    bursts = tuple(zip(*views, strict=True))
+    return Measurement(captures, tuple(shifts), tuple(drifts), tuple(notes), images, bursts)
 
 
 def _pair(view: View, index: int, captures: CapturePair, drift: Similarity) -> ImagePair:
@@ -79,21 +84,53 @@ def _measure_view(
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     exposures = _exposures(scene, index, captures.reference, captures.flow)
     check_pair(captures.reference, captures.flow, index, exposures.variance)
-    shape, window_px = exposures.before.shape, exposures.window_px
-    centres = window_centres(shape, window_px)
+    in_room, beyond = _wall_and_beyond(scene, index, exposures)
+    prior, said = mount(view.drift_std_px), ""
+    if captures.after is not None:
+        found = between_references(captures, scene, index)
+        prior, said = found.at(_share(captures.reference, captures.flow, captures.after)), f"{found.said} "
+    shift, drift, note = without_known_drift(exposures, in_room, beyond, prior)
+    covered = covered_windows(scene, index, captures.reference.images[index].mean, exposures.window_px)
+    return _in_room(shift, in_room, covered, drift, said + note)
+
+
+def _wall_and_beyond(scene: Scene, index: int, exposures: Exposures) -> tuple[Mask, Mask]:
+    """The windows on the back wall, and those beyond it that may be still."""
+    window_px, centres = exposures.window_px, window_centres(exposures.before.shape, exposures.window_px)
     in_room = sees_wall(scene, index, centres, margin_px=float(window_px))
     # The wall's own edge, seen through the room's air, must not reach into a window that counts as still, nor into
     # the filter of its gradient.
     reach_px = 0.5 * window_px + len(derivative_filter()) // 2
     beyond = ~sees_wall(scene, index, centres, margin_px=-reach_px)
     beyond &= ~hidden_by_objects(scene, index, centres, margin_px=float(window_px))
-    prior, said = mount(view.drift_std_px), ""
-    if captures.after is not None:
-        found = between_references(captures, scene, index)
-        prior, said = found.at(_share(captures.reference, captures.flow, captures.after)), f"{found.said} "
-    shift, drift, note = without_known_drift(exposures, in_room, beyond & _whole(centres, shape), prior)
-    covered = covered_windows(scene, index, captures.reference.images[index].mean, window_px)
-    return _in_room(shift, in_room, covered, drift, said + note)
+    return in_room, beyond & _whole(centres, exposures.before.shape)
+
+
+def _burst_shifts(
+    scene: Scene, index: int, captures: CapturePair, shift: ShiftMeasurement
+) -> tuple[ShiftMeasurement, ...]:
+    """How the pattern moved from the mean of a sequence to each of its bursts, in the windows of `shift`.
+
+    Their information is that of the burst's own noise.
+    """
+    mean, view = captures.flow.images[index].mean, scene.views[index]
+    found = []
+    for number, folder in enumerate(burst.folder for burst in captures.bursts):
+        burst = load_capture(folder)
+        variance = uniform_filter(_variance(burst, index, view), 2 * shift.window_px)
+        exposures = Exposures(mean, burst.images[index].mean, variance, shift.window_px)
+        if number == 0:
+            in_room, beyond = _wall_and_beyond(scene, index, exposures)
+            chosen = _among(window_centres(mean.shape, shift.window_px), shift.centres_px)
+        alone, _, _ = without_known_drift(exposures, in_room, beyond, mount(view.drift_std_px))
+        found.append(alone.at(chosen))
+    return tuple(found)
+
+
+def _among(centres_px: Float[np.ndarray, "windows 2"], chosen_px: Float[np.ndarray, "some 2"]) -> Mask:
+    """Which windows are among the chosen; both are in the picture's order."""
+    chosen = {tuple(centre) for centre in chosen_px}
+    return np.array([tuple(centre) in chosen for centre in centres_px])
 
 
 def between_references(captures: CapturePair, scene: Scene, index: int = 0) -> Agreement:

@@ -1,56 +1,44 @@
 """How far the mean of a sequence of bursts is from that over a long time: as an error of the shifts, and in words."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
-from app.experiment.captures import Capture, CapturePair, load_capture
+from app.experiment.captures import CapturePair
 from core.averaging import LEAST_BURSTS, ShortMean, short_mean
-from core.displacement import measure_shift
+from core.motion import without_motion
 from core.problem import ShiftMeasurement
-
-Variance = Callable[[Capture], Float[np.ndarray, "rows cols"]]
 
 
 def with_short_mean(
-    shift: ShiftMeasurement, captures: CapturePair, view: int, variance: Variance
+    shift: ShiftMeasurement, bursts: Sequence[ShiftMeasurement], captures: CapturePair
 ) -> tuple[ShiftMeasurement, str]:
     """The shift of a sequence's mean with the error of that mean, and a sentence on it; of one burst, as it is.
 
-    `variance` is that of the pixels of a capture's mean picture. Raises BadInputError.
+    `bursts` are how its bursts are shifted against the mean of all, in the windows of `shift`.
     """
-    if not captures.bursts:
+    if not bursts:
         return shift, ""
-    if len(captures.bursts) < LEAST_BURSTS:
+    if len(bursts) < LEAST_BURSTS:
         return shift, (
-            f" The flow is the mean of {len(captures.bursts)} bursts: too few to tell how far such a mean is from "
-            f"that of a long time. Take {LEAST_BURSTS} or more."
+            f" The flow is the mean of {len(bursts)} bursts: too few to tell how far such a mean is from that of a "
+            f"long time. Take {LEAST_BURSTS} or more."
         )
-    found = short_mean(*_departures(shift, captures, view, variance))
+    information = np.mean([burst.information_per_px2 for burst in bursts], axis=0)
+    found = short_mean(np.stack([_still(burst, information) for burst in bursts]), information)
     if found.rms_px > 0.0:
         shift = replace(shift, short_mean_px=found.modes_px)
     return shift, _told(found, captures)
 
 
-def _departures(
-    shift: ShiftMeasurement, captures: CapturePair, view: int, variance: Variance
-) -> tuple[Float[np.ndarray, "bursts windows 2"], Float[np.ndarray, "windows 2 2"]]:
-    """How each burst is shifted against the mean of all, in the windows of `shift`; information of one burst."""
-    mean = captures.flow.images[view].mean
-    departures, information = [], []
-    for burst in captures.bursts:
-        capture = load_capture(burst.folder)
-        alone = measure_shift(
-            mean, capture.images[view].mean, variance(capture), shift.window_px, follow=False
-        )
-        place = {tuple(centre): number for number, centre in enumerate(alone.centres_px)}
-        chosen = [place[tuple(centre)] for centre in shift.centres_px]
-        departures.append(alone.displacement_px[chosen])
-        information.append(alone.information_per_px2[chosen])
-    return np.stack(departures), np.mean(information, axis=0)
+def _still(burst: ShiftMeasurement, information: np.ndarray) -> np.ndarray:
+    """The shifts of a burst without what a motion of the camera explains."""
+    if burst.motion is None:
+        return burst.displacement_px
+    motion = without_motion(burst.motion.at(burst.centres_px), information)
+    return motion.apply(burst.displacement_px)
 
 
 def _told(found: ShortMean, captures: CapturePair) -> str:

@@ -1,17 +1,15 @@
 """`export`: a result for another program.
 
 NetCDF (or HDF5), VTK image data, CSV, an OpenFOAM case, a picture, the surface of one temperature (PLY), paths of
-particles (VTK), or the report on two pages (PDF).
+particles (VTK), the bursts of a sequence (VTK's collection), or the report on two pages (PDF).
 """
 
 import shutil
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
-from pyevtk.hl import imageToVTK
+from typing import Literal
 
 from app.errors import BadInputError
 from app.experiment.folder import open_experiment
@@ -20,10 +18,12 @@ from app.files.durable import write_durably
 from app.report.figures import as_png, slices_figure
 from app.report.openfoam import write_openfoam
 from app.report.paths import write_vtu
+from app.report.series import write_series
 from app.report.surface import write_ply
+from app.report.volume_image import write_vti
 from core.result import Derived, Solution
 
-ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf"]
+ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf", "pvd"]
 
 
 def export(
@@ -36,9 +36,11 @@ def export(
     """Write the newest (or the given) result in another format and return the file. Raises BadInputError."""
     experiment = open_experiment(folder)
     source = (result or experiment.latest_result()) / "result.nc"
-    path = output or source.with_name(f"result-export.{kind}")
-    if path.suffix != f".{kind}":
-        raise BadInputError(f"The output is {path.name}; expected a name that ends in .{kind}.")
+    # A collection is several files, packed.
+    ending = "zip" if kind == "pvd" else kind
+    path = output or source.with_name(f"result-{'bursts' if kind == 'pvd' else 'export'}.{ending}")
+    if path.suffix != f".{ending}":
+        raise BadInputError(f"The output is {path.name}; expected a name that ends in .{ending}.")
     if level_k is not None and kind != "ply":
         raise BadInputError(
             f"A level was given for {kind}; only ply, the surface of one temperature, has one."
@@ -47,11 +49,12 @@ def export(
         write_durably(path, lambda temporary: shutil.copyfile(source, temporary))
     else:
         writers: dict[str, Callable[[Path, Solution], object]] = {
-            "vti": partial(_write_vti, derived=read_derived(source)),
+            "vti": partial(write_vti, derived=read_derived(source)),
             "csv": partial(_write_csv, derived=read_derived(source)),
             "zip": write_openfoam,
             "png": _write_png,
             "vtu": write_vtu,
+            "pvd": write_series,
         }
         writers["pdf"] = lambda temporary, _: _write_pdf(temporary, folder, source.parent)
         writers["ply"] = partial(write_ply, level_k=level_k)
@@ -61,29 +64,9 @@ def export(
     return path
 
 
-def _write_vti(path: Path, solution: Solution, derived: Sequence[Derived] = ()) -> None:
-    """VTK image data (XML): evenly spaced vertices, T, p, vectors and what follows from them as point data."""
-    dataset = to_dataset(solution, {}, derived)
-    points: dict[str, Any] = {
-        str(name): np.asfortranarray(dataset[name].to_numpy())
-        for name in dataset.data_vars
-        if name not in ("u", "v", "w")
-    }
-    if "u" in dataset:
-        components = [np.asfortranarray(dataset[name].to_numpy()) for name in ("u", "v", "w")]
-        points["velocity"] = (components[0], components[1], components[2])
-    axes = (solution.x_m, solution.y_m, solution.z_m)
-    imageToVTK(
-        str(path.with_suffix("")),
-        origin=tuple(float(axis[0]) for axis in axes),
-        spacing=tuple(float((axis[-1] - axis[0]) / (len(axis) - 1)) for axis in axes),
-        pointData=points,
-    )
-
-
 def _write_csv(path: Path, solution: Solution, derived: Sequence[Derived] = ()) -> None:
     """One row a vertex; the header names quantity and unit."""
-    dataset = to_dataset(solution, {}, derived)
+    dataset = to_dataset(replace(solution, departures=None), {}, derived)
     table = dataset.to_dataframe().reset_index()
     table.columns = [f"{name} [{dataset[name].attrs['units']}]" for name in table.columns]
     table.to_csv(path, index=False, float_format="%.9g")

@@ -10,6 +10,7 @@ from scipy.interpolate import RegularGridInterpolator
 from app.experiment.folder import open_experiment, read_manifest
 from app.experiment.results import read_result
 from app.volume.file import RoomVolume, filled, read_volume
+from app.volume.score_bursts import score_bursts
 from core.metrics import inner, mean_of_air, score_pressure, score_temperature, score_velocity
 from core.result import Solution
 
@@ -31,6 +32,7 @@ def score_experiment(folder: Path, truth_path: Path, result: Path | None = None)
         "information": experiment.settings.information,
         **scores,
         **coverage(solution, read_volume(truth_path)),
+        "bursts": score_bursts(experiment, manifest.get("bursts", []), solution),
         "outcome": solution.outcome.name,
         "solver_s": solution.solver_s,
         "wall_s": manifest.get("wall_s"),

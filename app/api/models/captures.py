@@ -92,6 +92,7 @@ class SettingResource(Strict):
 class CaptureResource(Strict):
     """One capture. `interrupted` ones have no manifest and are never used as a measurement.
 
+    `sequence` is the same for all bursts of one sequence, and none for a single burst.
     `reason` says why a `broken` one cannot be read. `revision` goes into the `If-Match` of a change of its notes.
     """
 
@@ -106,6 +107,7 @@ class CaptureResource(Strict):
     settings: list[SettingResource]
     notes: str
     revision: str
+    sequence: str | None = None
     reason: str = ""
 
 

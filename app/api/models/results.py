@@ -5,7 +5,7 @@ from typing import Any, Literal
 from app.api.models.strict import Strict
 
 Kind = Literal["found", "derived", "uncertainty", "truth", "error"]
-Form = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf"]
+Form = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf", "pvd"]
 
 
 class PresetResource(Strict):
@@ -44,12 +44,16 @@ class FieldResource(Strict):
 
 
 class ResultResource(Strict):
-    """A result: its grid, its fields, how it ended, and the manifest that says where it came from."""
+    """A result: its grid, its fields, how it ended, and the manifest that says where it came from.
+
+    `time_s` is when each burst of a sequence began; fields of a burst are asked for as NAME.NUMBER, from 0.
+    """
 
     result: str
     x_m: list[float]
     y_m: list[float]
     z_m: list[float]
+    time_s: list[float]
     fields: list[FieldResource]
     outcome: str
     advice: str

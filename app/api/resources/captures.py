@@ -217,6 +217,7 @@ def _shown(folder: Path, manifest: dict[str, Any]) -> CaptureResource:
         settings=[SettingResource(**_float(one, "granted")) for one in view.get("settings", [])],
         notes=_notes(folder),
         revision=revision_of(_notes(folder).encode()),
+        sequence=manifest.get("origin", {}).get("sequence", {}).get("id"),
     )
 
 

@@ -24,7 +24,17 @@ from app.api.services import Given, Services
 from app.api.wire.bodies import body
 from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
-from app.api.wire.volumes import Axis, Encoding, Packed, Shown, Volume, cut, pack
+from app.api.wire.volumes import (
+    Axis,
+    Encoding,
+    Packed,
+    Shown,
+    Volume,
+    burst_volume,
+    cut,
+    moving_volumes,
+    pack,
+)
 from app.errors import BadInputError
 from app.experiment.folder import read_manifest
 from app.files.reading import reading
@@ -61,7 +71,8 @@ def read_result(given: Given, experiment: Identifier, result: Identifier) -> Res
         x_m=solution.x_m.tolist(),
         y_m=solution.y_m.tolist(),
         z_m=solution.z_m.tolist(),
-        fields=[_field(volume) for volume in shown.volumes.values()],
+        time_s=[] if solution.departures is None else solution.departures.time_s.tolist(),
+        fields=[_field(volume) for volume in [*shown.volumes.values(), *moving_volumes(solution)]],
         outcome=solution.outcome.name,
         advice=solution.outcome.value,
         solver_s=solution.solver_s,
@@ -153,7 +164,15 @@ def read_export(given: Given, experiment: Identifier, result: Identifier, form: 
 
     folder = given.folders.item(experiment, "result", result)
     path = export(given.folders.folder(experiment), form, result=folder)
-    return FileResponse(path, media_type="application/octet-stream", filename=f"{experiment}-{result}.{form}")
+    return FileResponse(
+        path,
+        media_type="application/octet-stream",
+        filename=f"{experiment}-{result}{_ENDINGS.get(form, '.' + form)}",
+    )
+
+
+# A collection is several files, packed.
+_ENDINGS = {"pvd": "-bursts.zip"}
 
 
 @router.get("/presets")
@@ -192,6 +211,9 @@ def _shown(given: Services, experiment: str, result: str) -> tuple[Path, Shown]:
 
 
 def _volume(shown: Shown, field: str) -> Volume:
+    moving = burst_volume(shown.solution, field)
+    if moving is not None:
+        return moving
     if field not in shown.volumes:
         raise ApiError("not_found", f"This result has no field {field!r}; it has {', '.join(shown.volumes)}.")
     return shown.volumes[field]

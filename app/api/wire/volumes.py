@@ -13,7 +13,7 @@ from jaxtyping import Float32
 from app.api.models.results import Kind
 from app.api.wire.problems import ApiError
 from app.volume.file import Beside
-from core.result import Derived, Solution
+from core.result import Departures, Derived, Solution
 
 Encoding = Literal["u16", "f16", "f32"]
 Axis = Literal["x", "y", "z"]
@@ -79,10 +79,58 @@ def volumes_of(solution: Solution) -> dict[str, Volume]:
         for name, (unit, label, values) in found.items()
         if values is not None
     }
+    if solution.departures is not None:
+        made |= _of_bursts(solution, solution.departures)
     if solution.velocity_m_s is not None:
         speed = np.linalg.norm(solution.velocity_m_s, axis=-1)
         made["speed"] = Volume("speed", "m s-1", "speed of the air", "derived", speed.astype(np.float32))
     return made
+
+
+def _of_bursts(solution: Solution, found: Departures) -> dict[str, Volume]:
+    """What is the same for every burst."""
+    own_k, mean_k = found.temperature_std_k, solution.temperature_std_k
+    whole_k = own_k if mean_k is None else np.hypot(own_k, mean_k)
+    return {
+        name: Volume(name, "K", label, kind, np.asarray(values, np.float32))
+        for name, label, kind, values in (
+            ("T_rms", "fluctuation of T from burst to burst, rms", "derived", found.rms_k),
+            ("T_burst_std", "standard deviation of T in a burst", "uncertainty", whole_k),
+            ("T_departure_std", "standard deviation of a burst's departure", "uncertainty", own_k),
+        )
+    }
+
+
+# Fields of a sequence, of which each burst has its own: `T_burst.3` is that of the fourth.
+MOVING = {"T_burst": "temperature in a burst", "T_departure": "T in a burst less the mean"}
+
+
+def burst_volume(solution: Solution, name: str) -> Volume | None:
+    """The field of one burst; None for a name that is no burst's, or a burst that is not there."""
+    stem, _, number = name.partition(".")
+    found = solution.departures
+    if found is None or stem not in MOVING or not (number.isdecimal() or not number):
+        return None
+    burst = int(number or 0)
+    if burst >= len(found.time_s):
+        return None
+    values = found.temperature_k[burst] + (solution.temperature_k if stem == "T_burst" else 0.0)
+    return Volume(name, "K", MOVING[stem], "found", np.asarray(values, np.float32))
+
+
+def moving_volumes(solution: Solution) -> list[Volume]:
+    """The fields that move, all bursts behind one another along x: for their range."""
+    found = solution.departures
+    if found is None:
+        return []
+    bursts = [
+        [volume for n in range(len(found.time_s)) if (volume := burst_volume(solution, f"{stem}.{n}"))]
+        for stem in MOVING
+    ]
+    return [
+        Volume(stem, "K", label, "found", np.concatenate([one.values for one in every]))
+        for (stem, label), every in zip(MOVING.items(), bursts, strict=True)
+    ]
 
 
 def volumes_derived(derived: Sequence[Derived]) -> dict[str, Volume]:

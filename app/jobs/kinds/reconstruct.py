@@ -29,6 +29,7 @@ class ReconstructSettings(Strict):
     """What to solve with; the presets are listed by `airlens reconstruct --help`."""
 
     preset: str = Field(default="auto", min_length=1, max_length=64, pattern="^[a-z0-9-]+$")
+    sequence: bool = False
 
 
 def read(settings: Mapping[str, Any]) -> ReconstructSettings:
@@ -55,7 +56,9 @@ def run(attempt: Attempt, settings: ReconstructSettings) -> dict[str, Any]:
     told = _Teller(attempt, ambient_k)
     watch = Watch(told, attempt.stop.is_set, FolderStore(attempt.checkpoints))
     try:
-        done = reconstruct(experiment, settings.preset, watch=watch, into=attempt.output)
+        done = reconstruct(
+            experiment, settings.preset, sequence=settings.sequence, watch=watch, into=attempt.output
+        )
     except StoppedError as error:
         raise AttemptStoppedError from error
     told.show(done.solution, last=True)

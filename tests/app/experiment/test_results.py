@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
 from app.experiment.results import read_result, write_result
 from app.report.figures import as_png, volume_figure
-from core.result import Outcome, Solution
+from core.result import Departures, Outcome, Solution
 
 SHAPE = (3, 4, 5)
 
@@ -55,3 +57,31 @@ def test_where_the_measurements_speak_is_drawn():
     assert as_png(drawn).startswith(b"\x89PNG")
     # Three planes and the colour bar.
     assert len(drawn.axes) == 4
+
+
+def with_bursts() -> Solution:
+    rng = np.random.default_rng(4)
+    departures = Departures(
+        np.array([0.0, 6.0, 12.0]),
+        rng.uniform(-0.5, 0.5, (3, *SHAPE)).astype(np.float32),
+        rng.uniform(0.1, 0.2, SHAPE).astype(np.float32),
+        field_std_k=0.25,
+        field_length_m=0.5,
+    )
+    return replace(solution(), departures=departures)
+
+
+def test_the_bursts_of_a_sequence_come_back_along_a_time_axis(tmp_path):
+    written = with_bursts()
+    write_result(tmp_path / "result.nc", written, {"began": "2026-01-01 12:00:00"})
+
+    found = read_result(tmp_path / "result.nc").departures
+
+    assert found is not None
+    for name in ("time_s", "temperature_k", "temperature_std_k"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(written.departures, name))
+    assert (found.field_std_k, found.field_length_m) == (0.25, 0.5)
+    with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as dataset:
+        assert dataset["T_departure"].dims == ("time", "x", "y", "z")
+        assert dataset["time"].to_numpy()[1] == np.datetime64("2026-01-01T12:00:06")
+        np.testing.assert_allclose(dataset["T_rms"], written.departures.rms_k)

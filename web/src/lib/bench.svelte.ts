@@ -21,6 +21,8 @@ export type Page = (typeof PAGES)[number] | (typeof ASIDE)[number];
 
 // So many pixels across see the packaged room's 9.7 K in single windows; 384 would take 7400 frames.
 const SIMULATED_PX = 1536;
+// Fewer do not tell how they differ.
+export const LEAST_BURSTS = 3;
 const ACTIVE = ["queued", "running", "pausing", "cancelling", "lost"];
 
 export type Action = Given<"POST /jobs/{job}/{action}">["action"];
@@ -53,6 +55,8 @@ class Bench {
   opened = $state(false);
   /** How the next reconstruction is solved. */
   preset = $state("auto");
+  /** Whether each burst of a sequence is solved for as well. */
+  everyBurst = $state(true);
   /** What each running job says that it does. */
   stages = $state.raw<Record<string, string>>({});
   done = $state("");
@@ -83,6 +87,12 @@ class Bench {
   ownProjector = $derived(this.projector?.experiment === this.experiment ? this.projector : null);
   ownDesk = $derived(this.desk?.experiment === this.experiment ? this.desk : null);
   finished = $derived(this.captures.filter((one) => one.state === "finished"));
+  /** How many bursts the newest flow is of. */
+  bursts = $derived.by(() => {
+    const flows = this.finished.filter((one) => one.role === "flow");
+    const newest = flows.reduce<CaptureResource | null>((a, b) => (a && a.capture > b.capture ? a : b), null);
+    return newest?.sequence ? flows.filter((one) => one.sequence === newest.sequence).length : 1;
+  });
   next = $derived.by(() => this.nextStep());
 
   async start(): Promise<void> {
@@ -266,7 +276,7 @@ class Bench {
         kind: "reconstruct",
         experiment: this.here,
         title: `Reconstruct (${preset}): ${this.current?.title ?? this.experiment}`,
-        settings: { preset },
+        settings: { preset, sequence: this.bursts >= LEAST_BURSTS && this.everyBurst },
         key: crypto.randomUUID(),
       },
     );

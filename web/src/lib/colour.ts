@@ -64,8 +64,9 @@ export interface Scale {
 /** A scale for values between two bounds: symmetric about zero where the quantity has a sign. */
 export function scaleFor(name: string, low: number, high: number): Scale {
   const reach = Math.max(Math.abs(low), Math.abs(high)) || 1;
-  if (/^[uvwp](_truth)?$|_error$|_difference$/.test(name)) return { low: -reach, high: reach, kind: "signed" };
-  const kind = /^T(_truth)?$/.test(name) ? "warm" : "rising";
+  if (/^[uvwp](_truth)?$|_error$|_difference$|^T_departure(\.\d+)?$/.test(name))
+    return { low: -reach, high: reach, kind: "signed" };
+  const kind = /^T(_truth|_burst(\.\d+)?)?$/.test(name) ? "warm" : "rising";
   return { low, high: high > low ? high : low + 1e-6, kind };
 }
 

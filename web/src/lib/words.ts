@@ -59,6 +59,9 @@ const FIELDS: Record<string, string> = {
   ppd: "people dissatisfied (PPD)",
   age: "age of the air",
   informed: "share known from measurement",
+  T_burst: "temperature of a moment",
+  T_departure: "departure of a moment from the mean",
+  T_rms: "fluctuation of the temperature",
 };
 const PARTS: Record<string, (name: string) => string> = {
   std: (name) => `${name}: standard deviation`,
@@ -70,7 +73,7 @@ const PARTS: Record<string, (name: string) => string> = {
 
 /** `T_truth` -> "True temperature"; a name that is not known stays. */
 export function fieldName(name: string): string {
-  const [, stem = name, part] = /^(.*?)(?:_(std|truth|error|low|high))?$/.exec(name) ?? [];
+  const [, stem = name, part] = /^(.*?)(?:\.\d+)?(?:_(std|truth|error|low|high))?$/.exec(name) ?? [];
   const words = FIELDS[stem] ?? stem;
   const told = part ? PARTS[part]!(words) : words;
   return told.charAt(0).toUpperCase() + told.slice(1);
@@ -116,7 +119,7 @@ export function reading(field: Pick<FieldResource, "name" | "unit">, value: numb
 }
 
 /** True for temperatures of the air; differences and deviations are in kelvin whatever the scale. */
-export const isAbsolute = (field: Pick<FieldResource, "name">) => /^T(_truth)?$/.test(field.name);
+export const isAbsolute = (field: Pick<FieldResource, "name">) => /^T(_truth|_burst(\.\d+)?)?$/.test(field.name);
 
 export function unitOf(field: Pick<FieldResource, "name" | "unit">, celsius: boolean): string {
   if (celsius && isAbsolute(field)) return "°C";

@@ -1,0 +1,1 @@
+"""A sequence of bursts, each as its departure from the mean."""
