@@ -256,7 +256,9 @@ def _objects_before_openings(parts: Parts) -> Iterator[Said]:
     for path, box in _boxes(parts):
         for place, item in _named(parts, "supply", "outlet"):
             sound = all(low < high for low, high in zip(item.lower, item.upper, strict=True))
-            if sound and stands_before(box, Patch(wall=item.wall, lower_m=item.lower, upper_m=item.upper), room):
+            if sound and stands_before(
+                box, Patch(wall=item.wall, lower_m=item.lower, upper_m=item.upper), room
+            ):
                 yield Said(
                     path,
                     f"it stands against {place[0]} {int(place[1]) + 1} on {item.wall}, so no air can pass there. "
