@@ -125,6 +125,7 @@ def _manifest(
         "assumed": assumed,
         "wall_s": wall_s,
         "captures": captures.names,
+        "bursts": [burst.folder.name for burst in captures.bursts],
         "windows": [len(shift.displacement_px) for shift in measurement.shifts],
         "settings": to_plain(experiment.settings),
         "inputs": captures.inputs,

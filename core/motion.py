@@ -51,10 +51,10 @@ class CameraMotion(eqx.Module):
 
 
 class WithoutMotion(eqx.Module):
-    """Takes the motion out of shifts: s - out (along^T s)."""
+    """Takes the motion, or another error that the windows share, out of shifts: s - out (along^T s)."""
 
-    out: Float[np.ndarray, "windows 2 4"]
-    along: Float[np.ndarray, "windows 2 4"]
+    out: Float[np.ndarray, "windows 2 motions"]
+    along: Float[np.ndarray, "windows 2 motions"]
 
     def apply(self, shifts_px: Shifts) -> Shifts:
         """The shifts without what a motion of the camera explains."""
@@ -66,7 +66,7 @@ class WithoutMotion(eqx.Module):
 
 
 def without_motion(
-    motions_px: Float[np.ndarray, "windows 2 4"], information_per_px2: Float[np.ndarray, "windows 2 2"]
+    motions_px: Float[np.ndarray, "windows 2 motions"], information_per_px2: Float[np.ndarray, "windows 2 2"]
 ) -> WithoutMotion:
     """The map for windows of this information; those of none are moved, and move no other.
 

@@ -22,6 +22,8 @@ class ShiftMeasurement(eqx.Module):
 
     `refused` marks windows that show something else than the pattern, moved; None where all are good. `motion` is
     what the camera may have done between the exposures and is still in `displacement_px`; None where it stood still.
+    The columns of `short_mean_px` are independent errors of one standard deviation: how the mean over the flow's
+    bursts differs from that over a long time. None where it does not.
     """
 
     centres_px: Float[np.ndarray, "windows 2"]
@@ -30,6 +32,14 @@ class ShiftMeasurement(eqx.Module):
     window_px: int = eqx.field(static=True)
     refused: Bool[np.ndarray, " windows"] | None = None
     motion: CameraMotion | None = None
+    short_mean_px: Float[np.ndarray, "windows 2 modes"] | None = None
+
+    @property
+    def common_errors_px(self) -> Float[np.ndarray, "windows 2 errors"] | None:
+        """Independent errors of one standard deviation that many windows share; None where there are none."""
+        errors = [] if self.motion is None else [self.motion.at(self.centres_px)]
+        errors += [] if self.short_mean_px is None else [self.short_mean_px]
+        return np.concatenate(errors, axis=-1) if errors else None
 
     def at(self, chosen: Bool[np.ndarray, " windows"]) -> "ShiftMeasurement":
         """Only the windows that are chosen."""
@@ -40,6 +50,7 @@ class ShiftMeasurement(eqx.Module):
             self.window_px,
             None if self.refused is None else self.refused[chosen],
             self.motion,
+            None if self.short_mean_px is None else self.short_mean_px[chosen],
         )
 
     def good(self) -> "ShiftMeasurement":

@@ -17,7 +17,7 @@ from app.experiment.captures import CaptureRecorder
 from app.experiment.folder import Experiment, new_id
 from app.files.disk_space import check_room
 from app.rig.conditions import UNTOLD, Conditions, conditions_of, known_pairs, seconds_on
-from app.rig.open import air_of
+from app.rig.open import air_of, clock_of
 from drivers.burst import Burst, BurstOutcome, CapturePlan
 from drivers.capture import Abort, OnFrame, OnProgress, Taken, run_capture
 from drivers.errors import DeviceSettingError
@@ -135,16 +135,17 @@ def take_order(
     starts_s = evenly(order.bursts, order.every_s)
     check_times(starts_s, order.plan.frames / camera.info.frame_rate_hz)
     taken: list[TakenBurst] = []
+    name = name or new_id(experiment.captures_folder, order.plan.role)
 
     def one(start: BurstStart) -> Burst:
         sequence = None
         if order.bursts > 1:
-            sequence = asdict(start) | {"bursts": order.bursts, "every_s": order.every_s}
+            sequence = {"id": name} | asdict(start) | {"bursts": order.bursts, "every_s": order.every_s}
         own = name if start.number == 0 else None
         taken.append(take(camera, experiment, order.plan, order.told, watch, sequence=sequence, name=own))
         return taken[-1].burst
 
-    run_sequence(starts_s, one, abort=lambda: watch.stop() is not None)
+    run_sequence(starts_s, one, abort=lambda: watch.stop() is not None, clock=clock_of(camera))
     return taken
 
 

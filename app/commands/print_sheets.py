@@ -74,7 +74,7 @@ def board(
 ) -> None:
     """Write a board to calibrate with as a PDF at true scale."""
     from app.experiment.folder import open_experiment
-    from app.sheets.board import print_board, remember_board
+    from app.sheets.board import board_layout, print_board, remember_board
 
     opened = None if experiment is None else open_experiment(experiment)
     own = None if opened is None else opened.settings.rig.board
@@ -84,8 +84,11 @@ def board(
     )
     path, _ = print_board(settings, paper, out, opened)
     kept = opened is not None and remember_board(opened, settings)
+    rows, cols = board_layout(settings, paper).sheets
+    several = "" if rows * cols == 1 else f", {rows * cols} sheets, {rows} rows of {cols}"
     typer.echo(
-        f"{path}: {settings.kind} {settings.columns} x {settings.rows}, squares of {1e3 * settings.square_m:g} mm. "
+        f"{path}: {settings.kind} {settings.columns} x {settings.rows}, squares of {1e3 * settings.square_m:g} mm"
+        f"{several}. "
         "Print at 100 %, hold a ruler to the bar of 100 mm, and glue it on something flat."
         + (" It is the rig's board now." if kept else "")
     )

@@ -15,12 +15,13 @@ import hashlib
 import os
 import shutil
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import TypeAdapter
 
 from app.errors import AirlensError, BadInputError
@@ -55,17 +56,30 @@ class Capture:
 
 @dataclass(frozen=True)
 class CapturePair:
-    """The two captures that a measurement compares, and a second reference that was taken after them, or none."""
+    """The two captures that a measurement compares, and a second reference that was taken after them, or none.
+
+    `bursts` are those of a sequence, without their pictures, where `flow` is their mean.
+    """
 
     reference: Capture
     flow: Capture
     after: Capture | None = None
+    bursts: tuple[Capture, ...] = ()
 
     @property
     def names(self) -> dict[str, str]:
         """The folders' names by their part in the measurement."""
         parts = {"reference": self.reference, "flow": self.flow, "after": self.after}
         return {part: capture.folder.name for part, capture in parts.items() if capture is not None}
+
+    def _parts(self) -> Iterator[tuple[str, Capture]]:
+        yield "reference", self.reference
+        if self.bursts:
+            yield from ((f"flow/{number}", burst) for number, burst in enumerate(self.bursts))
+        else:
+            yield "flow", self.flow
+        if self.after is not None:
+            yield "after", self.after
 
     @property
     def inputs(self) -> dict[str, dict[str, str]]:
@@ -76,8 +90,7 @@ class CapturePair:
                 "file": name,
                 "sha256": digest,
             }
-            for role, capture in (("reference", self.reference), ("flow", self.flow), ("after", self.after))
-            if capture is not None
+            for role, capture in self._parts()
             for name, digest in capture.sha256.items()
         }
 
@@ -88,12 +101,54 @@ def newest_pair(experiment: Experiment) -> CapturePair:
     Raises BadInputError when one is missing or not as it was kept.
     """
     newest = experiment.latest_capture("reference")
-    flow = load_capture(experiment.latest_capture("flow"))
+    flow, bursts = _mean_flow(experiment, experiment.latest_capture("flow"))
     around = _references_around(experiment, flow)
     if around is None:
-        return CapturePair(load_capture(newest), flow)
+        return CapturePair(load_capture(newest), flow, bursts=bursts)
     before, after = around
-    return CapturePair(load_capture(before), flow, load_capture(after))
+    return CapturePair(load_capture(before), flow, load_capture(after), bursts)
+
+
+def _mean_flow(experiment: Experiment, newest: Path) -> tuple[Capture, tuple[Capture, ...]]:
+    """The newest flow; where it is of a sequence, the mean of its bursts, and these without their pictures."""
+    sequence = _sequence_of(read_manifest(newest))
+    if sequence is None:
+        return load_capture(newest), ()
+    others = {folder: read_manifest(folder) for folder in finished(experiment.captures_folder)}
+    whole = [
+        folder
+        for folder, about in others.items()
+        if about.get("complete") and _sequence_of(about) == sequence
+    ]
+    return mean_capture(whole or [newest])
+
+
+def _sequence_of(manifest: Mapping[str, Any]) -> str | None:
+    return manifest.get("origin", {}).get("sequence", {}).get("id")
+
+
+def mean_capture(folders: Sequence[Path]) -> tuple[Capture, tuple[Capture, ...]]:
+    """The mean of captures, each frame of the same weight, and these without their pictures.
+
+    It has the folder and the manifest of the last one. Raises BadInputError.
+    """
+    total: list[BurstImage] = []
+    bursts: list[Capture] = []
+    for folder in folders:
+        capture = load_capture(folder)
+        images = list(capture.images)
+        total = [_together(*both) for both in zip(total, images, strict=True)] if bursts else images
+        bursts.append(replace(capture, images=()))
+    return replace(bursts[-1], images=tuple(total)), tuple(bursts) if len(bursts) > 1 else ()
+
+
+def _together(first: BurstImage, second: BurstImage) -> BurstImage:
+    """Mean of the frames of both, and their mean scatter within a burst."""
+    frames = first.frames + second.frames
+    share = np.float32(second.frames / frames)
+    mean = first.mean + share * (second.mean - first.mean)
+    variance = first.std**2 + share * (second.std**2 - first.std**2)
+    return BurstImage(mean, np.sqrt(variance), frames)
 
 
 def _references_around(experiment: Experiment, flow: Capture) -> tuple[Path, Path] | None:

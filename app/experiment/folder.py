@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from app.errors import BadInputError
-from app.experiment.rig_settings import RigSettings
+from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.files.durable import publish_folder, staging_folder, write_json, write_text
 from app.files.reading import inside, parse_json, reading
 from app.files.toml import Strict, from_toml, to_toml
@@ -74,6 +74,15 @@ class Experiment:
     def checkpoint_folder(self) -> Path:
         """What `airlens reconstruct` goes on from; gone when it has ended."""
         return self.folder / "checkpoint"
+
+    @property
+    def truth(self) -> Path | None:
+        """The volume that a simulated rig looks at; None for a real rig."""
+        camera = self.settings.rig.camera
+        if not isinstance(camera, SimulatedCameraSettings):
+            return None
+        path = self.folder / camera.room
+        return path if path.is_file() else None
 
     def file(self, name: str) -> Path:
         """A file that the settings name, inside the folder. Raises BadInputError for a path outside it."""

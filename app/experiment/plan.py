@@ -19,6 +19,23 @@ class MapLine(Strict):
     shift_mpx: list[list[float | None]]
 
 
+class PlacesLine(Strict):
+    """What the camera would see from other places, as rows (y) of columns (x) at its height; null where none.
+
+    Signal to noise of the picture and of a window, and the share of the wall that is seen. The camera now stands
+    at `camera_m`; the room reaches from `lower_m` to `upper_m` along x and y.
+    """
+
+    x_m: list[float]
+    y_m: list[float]
+    picture_signal_to_noise: list[list[float | None]]
+    signal_to_noise: list[list[float | None]]
+    wall_share: list[list[float | None]]
+    camera_m: list[float]
+    lower_m: list[float]
+    upper_m: list[float]
+
+
 class ViewLine(Strict):
     """What one view would see. `frames_needed`: for the expected flow to stand out in one window."""
 
@@ -37,6 +54,7 @@ class ViewLine(Strict):
     other_light: str
     other_light_shift_p99_px: float
     map: MapLine
+    places: PlacesLine | None = None
 
 
 class ChoiceLine(Strict):

@@ -34,6 +34,9 @@ def write_shifts(folder: Path, shifts: tuple[ShiftMeasurement, ...]) -> None:
             },
             attrs={"Conventions": "CF-1.11", "window_px": shift.window_px} | _motion_attributes(shift.motion),
         )
+        if shift.short_mean_px is not None:
+            about = {"long_name": "errors of one standard deviation of a mean over a short time"}
+            dataset["short_mean"] = (("window", "component", "error"), shift.short_mean_px, pixel | about)
         with durable_path(folder / f"shift-{index}.nc") as temporary:
             dataset.to_netcdf(temporary, engine="h5netcdf")
 
@@ -66,6 +69,7 @@ def read_shifts(folder: Path) -> tuple[ShiftMeasurement, ...]:
                     information_per_px2=data["information"].to_numpy(),
                     window_px=int(np.asarray(data.attrs["window_px"])),
                     motion=_motion(data.attrs),
+                    short_mean_px=data["short_mean"].to_numpy() if "short_mean" in data else None,
                 )
             )
     if not shifts:

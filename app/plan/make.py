@@ -6,7 +6,16 @@ from pathlib import Path
 import numpy as np
 
 from app.experiment.folder import Experiment, open_experiment
-from app.experiment.plan import PLAN_FILE, ChoiceLine, MapLine, Plan, PresetLine, SeenLine, ViewLine
+from app.experiment.plan import (
+    PLAN_FILE,
+    ChoiceLine,
+    MapLine,
+    PlacesLine,
+    Plan,
+    PresetLine,
+    SeenLine,
+    ViewLine,
+)
 from app.files.durable import write_json
 from app.files.toml import to_plain
 from app.plan.acting import acting_choices
@@ -21,6 +30,7 @@ from core.plan.choice import Choice
 from core.plan.cost import Speed, Work, draft_work, grid_work, paper_work, room_work
 from core.plan.expected import ExpectedFlow, expected_flow
 from core.plan.observability import seen
+from core.plan.places import place_map
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import Signal, other_light, shift_map, signal
 from core.plan.verdicts import blindness, broken, verdict
@@ -42,9 +52,11 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
     signals = signals_of(problem, flow)
     on_stage("what the views determine")
     determined = seen(problem, flow, signals)
+    on_stage("signal from other places of the camera")
+    places = [_places(problem, n, flow) for n in range(len(signals))]
     on_stage("judge the choices")
     choices = acting_choices(problem.scene, flow, signals)
-    views = [_view_line(problem, n, flow, s) for n, s in enumerate(signals)]
+    views = [_view_line(problem, n, flow, s, places[n]) for n, s in enumerate(signals)]
     machine, source = this_machine()
     made = Plan(
         expected=flow.source,
@@ -141,7 +153,9 @@ def windows_of(found: Signal) -> int:
     return len(found.shift.centres_px) * found.shift.stride**2
 
 
-def _view_line(problem: Problem, view: int, flow: ExpectedFlow, found: Signal) -> ViewLine:
+def _view_line(
+    problem: Problem, view: int, flow: ExpectedFlow, found: Signal, places: PlacesLine
+) -> ViewLine:
     scene, noise_px = problem.scene, found.noise.mean_px
     other = other_light(scene, view)
     frames, visible = scene.views[view].frames, np.isfinite(noise_px) and found.snr > 0
@@ -163,7 +177,28 @@ def _view_line(problem: Problem, view: int, flow: ExpectedFlow, found: Signal) -
         other_light=other.light.kind,
         other_light_shift_p99_px=shift_map(other, view, flow, found.noise.window_px).percentile_px(99),
         map=_map(found),
+        places=places,
     )
+
+
+def _places(problem: Problem, view: int, flow: ExpectedFlow) -> PlacesLine:
+    scene = problem.scene
+    found = place_map(scene, view, flow)
+    return PlacesLine(
+        x_m=found.x_m.tolist(),
+        y_m=found.y_m.tolist(),
+        picture_signal_to_noise=_rows(found.picture_snr),
+        signal_to_noise=_rows(found.snr),
+        wall_share=_rows(found.wall_share),
+        camera_m=list(scene.views[view].camera.position_m),
+        lower_m=list(scene.room.lower_m[:2]),
+        upper_m=list(scene.room.upper_m[:2]),
+    )
+
+
+def _rows(values: np.ndarray) -> list[list[float | None]]:
+    """JSON has no number for what is not there."""
+    return [[round(float(v), 6) if np.isfinite(v) else None for v in row] for row in values]
 
 
 def _map(found: Signal) -> MapLine:
@@ -177,7 +212,7 @@ def _map(found: Signal) -> MapLine:
     return MapLine(
         columns_px=[float(c) for c in columns],
         rows_px=[float(r) for r in rows],
-        shift_mpx=[[round(float(v), 6) if np.isfinite(v) else None for v in row] for row in picture],
+        shift_mpx=_rows(picture),
     )
 
 

@@ -11,6 +11,7 @@ from app.experiment.captures import Capture, CapturePair
 from app.reconstruct.cover import covered_windows
 from app.reconstruct.drift import Agreement, Exposures, agreement, mount, without_known_drift
 from app.reconstruct.pair import check_pair
+from app.reconstruct.short_mean import with_short_mean
 from core.camera_noise import frame_variance, scattered_variance
 from core.displacement import resolve_window_px, window_centres
 from core.drift import Similarity, move_image
@@ -44,9 +45,12 @@ def measure(captures: CapturePair, scene: Scene) -> Measurement:
     shifts, drifts, notes = [], [], []
     for index, view in enumerate(scene.views):
         shift, drift, note = _measure_view(scene, index, view, captures)
+        shift, averaged = with_short_mean(
+            shift, captures, index, lambda one, n=index, v=view: _variance(one, n, v)
+        )
         shifts.append(shift)
         drifts.append(drift)
-        notes.append(note)
+        notes.append(note + averaged)
     images: tuple[ImagePair, ...] = ()
     if scene.solve.data_term == "warped":
         images = tuple(_pair(view, n, captures, drifts[n]) for n, view in enumerate(scene.views))

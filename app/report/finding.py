@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32
 
-from app.experiment.captures import CapturePair, load_capture
+from app.experiment.captures import CapturePair, load_capture, mean_capture
 from app.experiment.folder import Experiment, read_manifest
 from app.experiment.results import read_result
 from app.experiment.shift_files import read_shifts
 from app.report.indoor import Indoor, indoor
 from app.report.maps import derived_maps
-from app.volume.comparison import truth_file
 from app.volume.file import RoomVolume, read_volume
 from app.volume.score import score_solution
 from core.problem import ShiftMeasurement
@@ -38,7 +37,7 @@ class Finding:
     @cached_property
     def truth(self) -> RoomVolume | None:
         """The room that a simulated rig looked at. Raises BadInputError."""
-        path = truth_file(self.experiment)
+        path = self.experiment.truth
         return None if path is None else read_volume(path)
 
     @cached_property
@@ -65,7 +64,8 @@ def read_finding(experiment: Experiment, folder: Path) -> Finding:
         names = manifest["captures"]
         kept = experiment.captures_folder
         after = load_capture(kept / names["after"]) if "after" in names else None
-        return CapturePair(load_capture(kept / names["reference"]), load_capture(kept / names["flow"]), after)
+        flow, bursts = mean_capture([kept / name for name in manifest.get("bursts") or [names["flow"]]])
+        return CapturePair(load_capture(kept / names["reference"]), flow, after, bursts)
 
     solution = read_result(folder / "result.nc")
     return Finding(experiment, folder.name, manifest, solution, lambda: read_shifts(folder), captures)

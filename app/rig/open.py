@@ -19,7 +19,7 @@ from calibration.board import Board
 from core.geometry import Optics
 from core.scene import ProjectedPattern, Scene
 from drivers.burst import CaptureRole
-from drivers.clock import SystemClock
+from drivers.clock import Clock, SystemClock
 from drivers.display import PatternDisplay, Picture
 from drivers.projector.protocol import Projector
 from drivers.protocols import Camera
@@ -53,6 +53,11 @@ def named_camera(experiment: Experiment) -> CameraSettings:
         'experiment.toml: [rig.camera] with kind = "v4l2", device, width_px, height_px and exposure_s; '
         'or with kind = "simulated" for a rig that is computed.'
     )
+
+
+def clock_of(camera: Camera) -> Clock:
+    """The time that bursts of this camera are waited for in: a simulated room's passes at once."""
+    return camera.clock if isinstance(camera, SimulatedCamera) else SystemClock()
 
 
 def air_of(role: CaptureRole) -> AirState:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from app.errors import BadInputError
 from app.experiment.folder import (
+    SETTINGS_FILE,
     Experiment,
     ExperimentSettings,
     create_experiment,
@@ -72,7 +73,8 @@ def answers_text(experiment: Experiment) -> str:
     path = experiment.folder / ANSWERS_FILE
     if not path.is_file():
         raise BadInputError(
-            f"{experiment.folder.name} was not made from answers. Change its experiment.toml, or make a new one."
+            f"The rig and the room of {experiment.folder.name} were not entered as answers, so they cannot be edited "
+            f"here: change them in {(experiment.folder / SETTINGS_FILE).resolve()}."
         )
     with reading(path, "Correct the file."):
         return path.read_text(encoding="utf-8")

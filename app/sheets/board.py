@@ -1,4 +1,7 @@
-"""A board to calibrate with, on one sheet: what `airlens calibrate` is then told of it is what was printed."""
+"""A board to calibrate with: what `airlens calibrate` is then told of it is what was printed.
+
+A board that is larger than the paper is laid over several sheets, with marks to put them together by.
+"""
 
 from pathlib import Path
 
@@ -11,13 +14,17 @@ from app.experiment.printed import PRINT_FOLDER, Printed
 from app.experiment.rig_settings import BoardSettings
 from app.files.lock import locked
 from app.files.toml import to_plain
-from app.sheets.drawing import Sheets
-from app.sheets.paper import Paper, papers_of
+from app.sheets.drawing import Sheets, shared_by
+from app.sheets.paper import Layout, Tile, laid_out, papers_of
 from app.sheets.record import keep_record, version, write_sheets
 from calibration.board import Board, CharucoBoard
 
 # Print pixels along a square: at least, at most.
 _PX_A_SQUARE = (100, 400)
+# So many sheets are put together by hand, and no more.
+_MOST_SHEETS = 40
+# What neighbouring sheets share.
+_OVERLAP_M = 0.01
 
 
 def largest_square_m(settings: BoardSettings, paper: str) -> float:
@@ -36,21 +43,27 @@ def suited_board(paper: str) -> BoardSettings:
 def print_board(
     settings: BoardSettings, paper: str, out: Path | None = None, experiment: Experiment | None = None
 ) -> tuple[Path, Printed | None]:
-    """Write the board as a PDF; an experiment keeps the record. Raises BadInputError: it is larger than the paper."""
+    """Write the board as a PDF; an experiment keeps the record. Raises BadInputError: it needs too many sheets."""
     board = settings.board()
-    sheet = _fitting(settings, paper)
     px = _px_per_square(board)
-    picture = board.draw(px)
     pixel_m = settings.square_m / px
+    layout = board_layout(settings, paper)
+    name = layout.paper.name
     folder = Path() if experiment is None else experiment.folder / PRINT_FOLDER
-    path = out or folder / f"board-{sheet.name}.pdf"
-    footer = (
-        f"airlens {version()}: {_told(settings, board)}, scale 1:1, on {sheet.name}.",
-        _calibrate(settings),
-    )
-    digest = write_sheets(
-        path, "airlens: board", lambda sheets: _page(sheets, sheet, picture, pixel_m, footer)
-    )
+    path = out or folder / f"board-{name}.pdf"
+    picture = board.draw(px)
+    told = f"airlens {version()}: {_told(settings, board)}, scale 1:1, on {name}"
+
+    def draw(sheets: Sheets) -> None:
+        for tile in layout.tiles:
+            part = np.ascontiguousarray(picture[tile.rows, tile.cols])
+            footer = (f"{told}{_place(layout, tile)}.", _calibrate(settings))
+            alone = len(layout.tiles) == 1
+            sheets.add(
+                layout.paper, part, pixel_m, footer, None if alone else shared_by(layout, tile, pixel_m)
+            )
+
+    digest = write_sheets(path, "airlens: board", draw)
     if experiment is None:
         return path, None
     rows, cols = picture.shape
@@ -62,10 +75,29 @@ def print_board(
         content=to_plain(settings),
         width_m=cols * pixel_m,
         height_m=rows * pixel_m,
-        paper=sheet.name,
-        sheets=(1, 1),
-        overlap_m=0.0,
+        paper=name,
+        sheets=layout.sheets,
+        overlap_m=0.0 if len(layout.tiles) == 1 else _OVERLAP_M,
         print_pixel_m=pixel_m,
+    )
+
+
+def board_layout(settings: BoardSettings, paper: str) -> Layout:
+    """The sheets that the board is printed on. Raises BadInputError: they are too many."""
+    squares = _squares(settings)
+    width_m, height_m = (settings.square_m * count for count in squares)
+    largest = max(one.area_m[0] * one.area_m[1] for one in papers_of(paper))
+    px = _px_per_square(settings.board())
+    if width_m * height_m <= _MOST_SHEETS * largest:
+        rows, cols = (round(px * count) for count in reversed(squares))
+        layout = laid_out(rows, cols, settings.square_m / px, paper, _OVERLAP_M)
+        if len(layout.tiles) <= _MOST_SHEETS:
+            return layout
+    least_mm = 1e3 * largest_square_m(settings, paper)
+    raise BadInputError(
+        f"The board is {1e3 * width_m:.0f} x {1e3 * height_m:.0f} mm with its white margin, more than "
+        f"{_MOST_SHEETS} sheets of {paper}. Take larger paper; on one sheet of {paper} its squares may be "
+        f"{least_mm:g} mm (--square {least_mm:g}mm)."
     )
 
 
@@ -80,20 +112,12 @@ def remember_board(experiment: Experiment, settings: BoardSettings) -> bool:
     return True
 
 
-def _page(sheets: Sheets, paper: Paper, picture: np.ndarray, pixel_m: float, footer: tuple[str, str]) -> None:
-    sheets.add(paper, picture, pixel_m, footer)
-
-
-def _fitting(settings: BoardSettings, paper: str) -> Paper:
-    width_m, height_m = (settings.square_m * squares for squares in _squares(settings))
-    for one in papers_of(paper):
-        if width_m <= one.area_m[0] + 1e-6 and height_m <= one.area_m[1] + 1e-6:
-            return one.cut(height_m)
-    least_mm = 1e3 * largest_square_m(settings, paper)
-    raise BadInputError(
-        f"The board is {1e3 * width_m:.0f} x {1e3 * height_m:.0f} mm with its white margin, larger than {paper}; "
-        f"its squares may be {least_mm:g} mm there (--square {least_mm:g}mm)."
-    )
+def _place(layout: Layout, tile: Tile) -> str:
+    """Which sheet this is, where there are several."""
+    if len(layout.tiles) == 1:
+        return ""
+    rows, cols = layout.sheets
+    return f", row {tile.row} of {rows} from the top, column {tile.col} of {cols} from the left"
 
 
 def _squares(settings: BoardSettings) -> tuple[float, float]:

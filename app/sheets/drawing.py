@@ -16,7 +16,7 @@ from reportlab.lib.units import mm
 from reportlab.lib.utils import ImageReader
 from reportlab.pdfgen.canvas import Canvas
 
-from app.sheets.paper import FOOTER_M, MARGIN_M, Paper
+from app.sheets.paper import FOOTER_M, MARGIN_M, Layout, Paper, Tile
 
 BAR_M = 0.1
 _M = 1000 * mm
@@ -32,6 +32,20 @@ class Shared:
     right_m: float = 0.0
     top_m: float = 0.0
     bottom_m: float = 0.0
+
+
+def shared_by(layout: Layout, tile: Tile, pixel_m: float) -> Shared:
+    """How far the neighbours reach into this tile; a print pixel's edge is `pixel_m`."""
+    by_place = {(one.row, one.col): one for one in layout.tiles}
+
+    def shared_m(row: int, col: int) -> float:
+        other = by_place.get((tile.row + row, tile.col + col))
+        if other is None:
+            return 0.0
+        mine, its = (tile.rows, other.rows) if row else (tile.cols, other.cols)
+        return (min(mine.stop, its.stop) - max(mine.start, its.start)) * pixel_m
+
+    return Shared(shared_m(0, -1), shared_m(0, 1), shared_m(-1, 0), shared_m(1, 0))
 
 
 class Sheets:

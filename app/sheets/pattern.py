@@ -18,7 +18,7 @@ from app.experiment.folder import Experiment, open_experiment, save_settings
 from app.experiment.printed import PRINT_FOLDER, Printed
 from app.files.lock import locked
 from app.files.toml import to_plain
-from app.sheets.drawing import Shared, Sheets
+from app.sheets.drawing import Sheets, shared_by
 from app.sheets.paper import Layout, Tile, laid_out
 from app.sheets.record import keep_record, version, write_sheets
 from core.pattern import pattern_parts
@@ -149,7 +149,8 @@ def print_pattern(
         for number, tile in enumerate(layout.tiles, 1):
             picture = pattern.picture(tile.rows, tile.cols)
             footer = _footer(pattern, layout, tile, period_px)
-            sheets.add(layout.paper, picture, pattern.print_pixel_m, footer, _shared(pattern, layout, tile))
+            shared = shared_by(layout, tile, pattern.print_pixel_m)
+            sheets.add(layout.paper, picture, pattern.print_pixel_m, footer, shared)
             on_sheet(number, len(layout.tiles))
 
     digest = write_sheets(path, f"airlens: pattern of {experiment.folder.name}", draw)
@@ -181,17 +182,3 @@ def _footer(pattern: PrintPattern, layout: Layout, tile: Tile, period_px: float)
         f"Row {tile.row} of {rows} from the top, column {tile.col} of {cols} from the left, on {layout.paper.name}. "
         "Inner marks: the next sheet's picture ends there.",
     )
-
-
-def _shared(pattern: PrintPattern, layout: Layout, tile: Tile) -> Shared:
-    """How far the neighbours reach into this tile."""
-    by_place = {(one.row, one.col): one for one in layout.tiles}
-
-    def shared_m(row: int, col: int) -> float:
-        other = by_place.get((tile.row + row, tile.col + col))
-        if other is None:
-            return 0.0
-        mine, its = (tile.rows, other.rows) if row else (tile.cols, other.cols)
-        return (min(mine.stop, its.stop) - max(mine.start, its.start)) * pattern.print_pixel_m
-
-    return Shared(shared_m(0, -1), shared_m(0, 1), shared_m(-1, 0), shared_m(1, 0))

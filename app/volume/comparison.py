@@ -10,7 +10,6 @@ from scipy.interpolate import RegularGridInterpolator
 
 from app.experiment.boundary import read_sensors
 from app.experiment.folder import Experiment
-from app.experiment.rig_settings import SimulatedCameraSettings
 from app.volume.file import Beside, read_volume
 from app.volume.score import score_solution, truth_at
 from core.result import Solution
@@ -26,15 +25,6 @@ class Reading:
     measured: float
     std: float
     found: float
-
-
-def truth_file(experiment: Experiment) -> Path | None:
-    """The volume that a simulated rig looks at; None for a real rig."""
-    camera = experiment.settings.rig.camera
-    if not isinstance(camera, SimulatedCameraSettings):
-        return None
-    path = experiment.folder / camera.room
-    return path if path.is_file() else None
 
 
 def beside_truth(solution: Solution, path: Path) -> list[Beside]:

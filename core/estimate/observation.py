@@ -16,7 +16,7 @@ from core.drift import nearly_still
 from core.estimate.plane_openings import still_vertices
 from core.geometry import Box, face_of
 from core.known import measured_outlets
-from core.motion import CameraMotion, WithoutMotion, without_motion
+from core.motion import WithoutMotion, without_motion
 from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.rays.operator import StraightRayOperator, build
 from core.rays.visibility import away_from_walls
@@ -78,15 +78,17 @@ def shift_blocks(
     blocks = ShiftBlocks(
         operator, row, weight, np.zeros(total.shape[:2]), np.diagonal(covariance, axis1=1, axis2=2).copy()
     )
-    still = None if measured.motion is None else _still(blocks, measured.motion, nearly_still(measured))
+    errors_px = measured.common_errors_px
+    still = None if errors_px is None else _still(blocks, errors_px, nearly_still(measured))
     blocks = eqx.tree_at(lambda b: b.still, blocks, still, is_leaf=lambda leaf: leaf is None)
     return eqx.tree_at(lambda b: b.displacement_px, blocks, blocks.pooled(measured.displacement_px))
 
 
-def _still(blocks: ShiftBlocks, motion: CameraMotion, measured: ShiftMeasurement) -> WithoutMotion:
-    """Takes the camera's motion out of blocks whose errors are their noise and what no grid represents."""
-    moves = motion.at(measured.centres_px)
-    motions = np.stack([blocks.pooled(moves[..., n]) for n in range(moves.shape[2])], axis=-1)
+def _still(
+    blocks: ShiftBlocks, errors_px: Float[np.ndarray, "windows 2 errors"], measured: ShiftMeasurement
+) -> WithoutMotion:
+    """Takes what windows share out of blocks whose own errors are their noise and what no grid represents."""
+    motions = np.stack([blocks.pooled(errors_px[..., n]) for n in range(errors_px.shape[2])], axis=-1)
     size_px = REPRESENTATION * float(np.median(np.abs(blocks.pooled(measured.displacement_px))))
     variance = CORRELATED_DATA * (blocks.variance_px2 + size_px**2)
     return without_motion(motions, np.einsum("ba,ac->bac", 1.0 / variance, np.eye(2)))

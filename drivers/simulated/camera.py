@@ -60,6 +60,11 @@ class SimulatedCamera:
         self._start()
 
     @property
+    def clock(self) -> Clock:
+        """The time that this camera lives in."""
+        return self._clock
+
+    @property
     def info(self) -> CameraInfo:
         """Identity, size and settings."""
         rows, cols = self._luminance.shape

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
+from app.client import Client
 from tests.app.api.resources.test_own_rig import room_file
 from tests.browser.conftest import Opens, Station, snapshot
 from tests.browser.test_story import PAINTED
@@ -156,8 +157,40 @@ def test_pictures_of_another_camera_are_brought_and_what_is_printed_is_a_pdf(
     wrong = tmp_path / "small.png"
     cv2.imwrite(str(wrong), np.zeros((48, 64), np.uint8))
     page.get_by_label("Flow: the air moving").last.set_input_files(wrong)
-    page.get_by_role("button", name="Import 1 files").click()
+    page.get_by_role("button", name="Import 1 file").click()
     expect(page.get_by_role("alert")).to_contain_text("The flow pictures have 64 x 48 px")
+
+
+def test_the_large_board_of_a_simulated_rig_is_printed_over_sheets(station: Station, opens: Opens):
+    page = opens(station.address).page
+    page.locator("button.next", has_text="Start a simulated rig").click()
+    page.get_by_role("button", name="Make a board").click()
+    made = page.locator("main p", has=page.get_by_role("link", name="Board (PDF)"))
+    expect(made).to_contain_text("15 sheets of A3, 1.20 × 0.90 m. Put them together at their marks")
+    expect(page.get_by_role("alert")).to_have_count(0)
+    snapshot(page, "board-over-sheets")
+
+
+def test_a_room_that_was_not_entered_on_the_page_says_where_it_is_edited(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=64).experiment
+        sent = next(one for one in client.templates() if one.template == "sample").answers
+        entered = client.create_from_answers({**sent, "title": "Entered here"}).experiment
+    page = opens(station.address).page
+    choice = page.get_by_role("combobox", name="Experiment")
+    choice.select_option(name)
+    page.get_by_role("button", name="Edit room").click()
+    file = station.app.state.services.folders.open(name).folder / "experiment.toml"
+    expect(page.locator("main")).to_contain_text(f"cannot be edited here: change them in {file.resolve()}.")
+    expect(page.get_by_role("alert")).to_have_count(0)
+    expect(page.get_by_role("radiogroup", name="Camera")).to_have_count(0)
+    expect(page.locator("button.next")).to_have_text("Calibrate")
+    snapshot(page, "room-not-entered")
+    # Another experiment, whose room was entered, opens in the same place.
+    choice.select_option(entered)
+    expect(page.get_by_label("Name", exact=True)).to_have_value("Entered here")
+    expect(page.locator("button.next")).to_have_text("Change the room")
+    expect(page.locator("main")).not_to_contain_text("cannot be edited here")
 
 
 def test_a_mistake_is_told_at_its_field_while_it_is_typed_and_can_be_undone(station: Station, opens: Opens):

@@ -20,6 +20,11 @@ def test_a_plan_says_what_would_be_seen_and_what_each_preset_would_cost(station:
     expect(canvas).to_have_attribute("data-painted", "1")
     canvas.hover()
     expect(page.locator(".shiftmap figcaption")).to_contain_text(re.compile(r"mpx, [\d.]+ times the noise"))
+    expect(page.locator(".places .spot")).to_have_count(49)
+    page.locator(".places .spot").nth(31).hover()
+    expect(page.locator(".places figcaption")).to_contain_text(
+        re.compile(r"m from the wall: the picture [\d.]+, a window [\d.]+, \d+ % of the wall")
+    )
     expect(page.locator("main")).to_contain_text("Choices made by auto")
     snapshot(page, "plan")
     page.get_by_role("button", name="Reconstruct", exact=True).click()

@@ -111,12 +111,12 @@ def read_history(given: Given, experiment: Identifier, result: Identifier) -> li
 @router.get("/experiments/{experiment}/results/{result}/comparison")
 def read_comparison(given: Given, experiment: Identifier, result: Identifier) -> ComparisonResource:
     """Return how a result compares with what is known better: a simulated room's truth, point sensors."""
-    # Imported here: the array library behind them takes a second to load.
-    from app.volume.comparison import readings, scores, truth_file
-
     _, shown = _shown(given, experiment, result)
+    # Imported here: the array library behind them takes a second to load, which reading the result has done.
+    from app.volume.comparison import readings, scores
+
     found = given.folders.open(experiment)
-    truth = truth_file(found)
+    truth = found.truth
     return ComparisonResource(
         scores=[] if truth is None else _score_lines(scores(shown.solution, truth)),
         readings=[
@@ -186,10 +186,8 @@ def _first_line(solve: object) -> str:
 
 
 def _shown(given: Services, experiment: str, result: str) -> tuple[Path, Shown]:
-    from app.volume.comparison import truth_file
-
     folder = given.folders.item(experiment, "result", result)
-    truth = truth_file(given.folders.open(experiment))
+    truth = given.folders.open(experiment).truth
     return folder, given.solutions.read(folder / "result.nc", truth)
 
 

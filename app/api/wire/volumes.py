@@ -121,14 +121,15 @@ class SolutionCache:
 
         Raises ApiError when there is no solution, BadInputError when one of them is damaged.
         """
-        # Imported here: xarray takes a second, and a service should answer before that.
-        from app.experiment.results import read_derived, read_result
-        from app.volume.comparison import beside_truth
-
         if not path.is_file():
             raise ApiError("not_found", "This result has no fields.")
         key = (path, path.stat().st_mtime_ns)
         with self._lock:
+            # Imported here: xarray takes a second, and a service should answer before that. One request at a time:
+            # two threads that import the same module at once may each see half of it.
+            from app.experiment.results import read_derived, read_result
+            from app.volume.comparison import beside_truth
+
             if key not in self._kept:
                 solution = read_result(path)
                 known = [] if truth is None else beside_truth(solution, truth)

@@ -103,10 +103,11 @@ class StillOperator:
 def without_drift(
     operator: ShiftOperator, shift: ShiftMeasurement, weight: Float[np.ndarray, "windows 2 2"]
 ) -> tuple[ShiftOperator, ShiftMeasurement]:
-    """The operator and the shifts without the camera's motion, for windows of this weight."""
-    if shift.motion is None:
+    """The operator and the shifts without what windows share (the camera's motion), for windows of this weight."""
+    errors_px = shift.common_errors_px
+    if errors_px is None:
         return operator, shift
-    still = without_motion(shift.motion.at(shift.centres_px), weight)
+    still = without_motion(errors_px, weight)
     return StillOperator(operator, still), replace(shift, displacement_px=still.apply(shift.displacement_px))
 
 

@@ -10,7 +10,7 @@ from app.errors import BadInputError
 from app.experiment.folder import create_experiment, open_experiment
 from app.experiment.printed import read_printed
 from app.experiment.rig_settings import BoardSettings
-from app.sheets.board import largest_square_m, print_board
+from app.sheets.board import board_layout, largest_square_m, print_board
 from tests.app.files.test_toml import example
 from tests.app.sheets.sheets import pictures_mm, texts
 
@@ -79,8 +79,33 @@ def test_a_board_needs_no_experiment(tmp_path):
     assert out.is_file()
 
 
-def test_a_board_larger_than_the_paper_is_refused_with_the_square_that_fits():
-    large = BoardSettings(kind="chessboard", columns=9, rows=6, square_m=0.05)
+def test_a_board_larger_than_the_paper_is_put_together_from_sheets(tmp_path):
+    large = BoardSettings(kind="chessboard", columns=9, rows=6, square_m=0.1)
+    path, record = print_board(large, "a3", experiment=create_experiment(tmp_path / "wall", example()))
+    assert record is not None
+    assert record.sheets == (3, 5)
+    pages = pictures_mm(path)
+    assert len(pages) == len(texts(path)) == 15
+    assert (record.width_m, record.height_m) == pytest.approx((1.2, 0.9))
+    px = round(large.square_m / record.print_pixel_m)
+    whole = large.board().draw(px)
+    seen = np.zeros(whole.shape, bool)
+    for tile, (place_mm, part) in zip(board_layout(large, "a3").tiles, pages, strict=True):
+        assert np.array_equal(part, whole[tile.rows, tile.cols])
+        assert place_mm[2] - place_mm[0] == pytest.approx(
+            1e3 * part.shape[1] * record.print_pixel_m, abs=0.01
+        )
+        seen[tile.rows, tile.cols] = True
+    assert seen.all()
+    assert "row 3 of 3 from the top, column 5 of 5 from the left" in texts(path)[-1]
+    told = run("--kind", "chessboard", "--square", "10cm", "--out", tmp_path / "board.pdf")
+    assert "15 sheets, 3 rows of 5. Print" in told
+
+
+def test_a_board_of_too_many_sheets_is_refused_with_the_square_that_fits_one():
+    large = BoardSettings(kind="chessboard", columns=9, rows=6, square_m=0.2)
     fits = BoardSettings(kind="chessboard", columns=9, rows=6, square_m=largest_square_m(large, "a4"))
-    with pytest.raises(BadInputError, match=f"larger than a4; its squares may be {1e3 * fits.square_m:g} mm"):
+    with pytest.raises(
+        BadInputError, match=f"more than 40 sheets of a4.* squares may be {1e3 * fits.square_m:g} mm"
+    ):
         print_board(large, "a4")

@@ -4,6 +4,8 @@ import type { paths, Problem as Told } from "./schema";
 
 /** What the page needs of a refusal; what lies beyond the service has no more. */
 export type Problem = Pick<Told, "code" | "title" | "detail" | "status"> & {
+  /** What happened, without what to do next. */
+  cause?: string;
   /** Where somebody else changed it meanwhile: how it stands, and what was sent. */
   current?: Record<string, unknown> | null;
   sent?: Record<string, unknown> | null;

@@ -39,6 +39,8 @@ class Draft {
   /** The experiment whose room is edited; null for a new one. */
   experiment = $state<string | null>(null);
   revision = $state("");
+  /** Why the experiment's room cannot be edited here; empty where it can. */
+  refused = $state("");
   past = $state.raw<Tree[]>([]);
   future = $state.raw<Tree[]>([]);
   private last = "";
@@ -59,10 +61,19 @@ class Draft {
   /** Opens what was typed before, or the answers of an experiment. */
   async open(experiment: string | null): Promise<void> {
     [this.past, this.future, this.last] = [[], [], ""];
-    [this.answers, this.check, this.experiment] = [{}, null, experiment];
+    [this.answers, this.check, this.experiment, this.refused] = [{}, null, experiment, ""];
+    // An answer to a question of before, about another experiment, is not waited for.
+    clearTimeout(this.timer);
+    this.asked++;
     if (experiment) {
-      const found = await ask("GET /experiments/{experiment}/answers", { experiment });
-      [this.answers, this.revision] = [found.answers, found.revision];
+      try {
+        const found = await ask("GET /experiments/{experiment}/answers", { experiment });
+        [this.answers, this.revision] = [found.answers, found.revision];
+      } catch (error) {
+        if (!(error instanceof ProblemError) || error.problem.code !== "bad_input") throw error;
+        this.refused = error.problem.cause ?? error.problem.detail;
+        return;
+      }
     } else this.answers = JSON.parse(localStorage.getItem(KEPT) ?? "{}") as Tree;
     this.later();
   }

@@ -74,5 +74,7 @@ def test_a_request_names_no_file_of_the_machine(client: Client, truth: str):
 
 def test_an_experiment_without_answers_says_so(client: Client):
     made = client.create_experiment(camera_px=64)
-    with pytest.raises(ServiceError, match="was not made from answers"):
+    with pytest.raises(
+        ServiceError, match=rf"were not entered as answers.*{made.experiment}.experiment\.toml"
+    ):
         client.answers(made.experiment)

@@ -7,6 +7,7 @@ from app.experiment.plan import (
     PLAN_FILE,
     ChoiceLine,
     MapLine,
+    PlacesLine,
     Plan,
     PresetLine,
     SeenLine,
@@ -23,6 +24,10 @@ def a_plan() -> Plan:
         smallest_visible_k=1.1, frames=100, frames_needed=1.2, other_light="projector",
         other_light_shift_p99_px=0.002,
         map=MapLine(columns_px=[16.0, 48.0], rows_px=[16.0], shift_mpx=[[4.0, None]]),
+        places=PlacesLine(
+            x_m=[0.5, 1.5], y_m=[1.0], picture_signal_to_noise=[[90.0, None]], signal_to_noise=[[2.0, None]],
+            wall_share=[[0.9, None]], camera_m=[1.0, -1.0, 1.2], lower_m=[0.0, 0.0], upper_m=[2.0, 3.0],
+        ),
     )  # fmt: skip
     return Plan(
         expected="a plume of 10 K",

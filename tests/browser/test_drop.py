@@ -1,0 +1,104 @@
+"""Pictures that another camera took are dropped on the page, and a result comes of them."""
+
+import base64
+import re
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+from playwright.sync_api import JSHandle, Locator, Page, expect
+
+from app.client import Client
+from tests.browser.conftest import Opens, Station, snapshot
+from tests.browser.test_faults import go_to
+from tests.browser.test_story import PAINTED, next_step
+
+FRAMES = 4
+COUNTS = 4095
+# What a browser hands to a page with files from the operator's desktop.
+HELD = """files => {
+    const held = new DataTransfer();
+    for (const { name, bytes } of files) {
+        const raw = Uint8Array.from(atob(bytes), letter => letter.charCodeAt(0));
+        held.items.add(new File([raw], name, { type: "image/png" }));
+    }
+    return held;
+}"""
+
+
+def held(page: Page, files: list[Path]) -> JSHandle:
+    """The files as they are dragged over the page."""
+    sent = [{"name": file.name, "bytes": base64.b64encode(file.read_bytes()).decode()} for file in files]
+    return page.evaluate_handle(HELD, sent)
+
+
+def drop(place: Locator, files: list[Path]) -> bool:
+    """Hold files over a place and let go; whether the browser would open them instead of the page."""
+    files_held = held(place.page, files)
+    for kind in ("dragenter", "dragover"):
+        place.dispatch_event(kind, {"dataTransfer": files_held})
+    return place.evaluate(
+        "(place, dataTransfer) => place.dispatchEvent("
+        "new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true }))",
+        files_held,
+    )
+
+
+def seen_elsewhere(client: Client, name: str, folder: Path) -> dict[str, list[Path]]:
+    """Frames of the simulated room as another camera's program would have written them, 12 bits in PNGs."""
+    draw = np.random.default_rng(0)
+    made: dict[str, list[Path]] = {}
+    for role in ("reference", "flow"):
+        client.start_capture(name, role, frames=8)
+        while client.running_capture().state == "running":
+            time.sleep(0.1)
+        taken = next(one for one in client.captures(name) if one.role == role)
+        mean = COUNTS * client.capture_image(name, taken.capture)
+        made[role] = [folder / f"{role}{number}.png" for number in range(FRAMES)]
+        for file in made[role]:
+            counts = np.clip(np.rint(mean + draw.normal(0, 5, mean.shape)), 0, COUNTS)
+            cv2.imwrite(str(file), counts.astype(np.uint16))
+        client.discard_capture(name, taken.capture)
+    return made
+
+
+def test_dropped_pictures_become_a_result(station: Station, opens: Opens, tmp_path: Path):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=256).experiment
+        client.connect_camera(name)
+        client.calibrate(name)
+        files = seen_elsewhere(client, name, tmp_path)
+        assert client.captures(name) == []
+        client.disconnect_camera()
+    watched = opens(station.address)
+    page = watched.page
+    go_to(page, "Capture")
+    page.get_by_text("Import pictures that another camera took").click()
+    reference = page.get_by_role("group", name="Reference: still air")
+    flow = page.get_by_role("group", name="Flow: the air moving")
+    # Beside the fields nothing is taken, and the page stays.
+    assert not drop(page.locator("main"), files["flow"])
+    expect(page.get_by_role("button", name="Import 0 files")).to_be_disabled()
+    assert not drop(reference, files["reference"][::-1])
+    expect(reference).to_contain_text("4 files")
+    assert reference.locator("input").evaluate("field => field.files.length") == 4
+    flow.dispatch_event("dragover", {"dataTransfer": held(page, files["flow"])})
+    expect(flow).to_have_class(re.compile("holding"))
+    snapshot(page, "dropping")
+    assert not drop(flow, files["flow"])
+    expect(flow).to_contain_text("4 files")
+    expect(flow).not_to_have_class(re.compile("holding"))
+    page.get_by_label("Bits of a count").fill("12")
+    page.get_by_role("button", name="Import 8 files").click()
+    expect(page.locator(".library li")).to_have_count(2)
+    for role in ("reference", "flow"):
+        expect(page.locator(".library li", has_text=role)).to_contain_text("4 frames, 256 × 192 px")
+    snapshot(page, "dropped")
+    go_to(page, "Reconstruct")
+    page.get_by_role("radio", name=re.compile("^draft")).check()
+    next_step(page, "Reconstruct")
+    next_step(page, "Look at the result")
+    expect(page.locator(".slice canvas").first).to_have_attribute("data-painted", PAINTED)
+    snapshot(page, "dropped-result")
+    assert watched.complaints == []
