@@ -48,10 +48,11 @@ def export(
     if kind in ("nc", "h5"):  # NetCDF-4 is HDF5
         write_durably(path, lambda temporary: shutil.copyfile(source, temporary))
     else:
+        scene = experiment.settings.scene
         writers: dict[str, Callable[[Path, Solution], object]] = {
             "vti": partial(write_vti, derived=read_derived(source)),
             "csv": partial(_write_csv, derived=read_derived(source)),
-            "zip": write_openfoam,
+            "zip": partial(write_openfoam, objects=scene.objects, air=scene.air),
             "png": _write_png,
             "vtu": write_vtu,
             "pvd": write_series,
