@@ -3,7 +3,7 @@
 import json
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -76,13 +76,16 @@ def reconstruct(
     captures = newest_pair(experiment)
     on_stage("measure the shift of the pattern")
     measurement = measure(captures, known.scene)
-    problem = problem_of(known, measurement.shifts, measurement.images)
+    # With what was found to stand in the room.
+    standing = replace(known, scene=measurement.scene)
+    problem = problem_of(standing, measurement.shifts, measurement.images)
     on_stage("check the rendered reference against the captured one")
     checked = rendered_agreement(known.scene, captures.reference)
     on_stage(f"solve ({preset})")
     solution = solved(solve, problem, watch)
     on_stage("keep the result")
-    told = [known.optics, *aged(experiment, captures), *measurement.notes, checked, *solution.notes]
+    stands = [one.sentence for one in measurement.found]
+    told = [known.optics, *aged(experiment, captures), *measurement.notes, *stands, checked, *solution.notes]
     result = into or _new_folder(experiment, preset)
     manifest = _manifest(experiment, preset, measurement, solution, told, time.perf_counter() - started)
     finding = Finding(
@@ -123,6 +126,7 @@ def _manifest(
         "advice": solution.outcome.value,
         "solver_s": solution.solver_s,
         "assumed": assumed,
+        "found": to_plain(measurement.found),
         "wall_s": wall_s,
         "captures": captures.names,
         "bursts": [burst.folder.name for burst in captures.bursts],

@@ -8,10 +8,12 @@ from scipy.ndimage import uniform_filter
 
 from app.errors import BadInputError
 from app.experiment.captures import Capture, CapturePair
-from app.reconstruct.cover import covered_windows
+from app.experiment.found import Found
 from app.reconstruct.drift import Agreement, Exposures, agreement, mount, without_known_drift
+from app.reconstruct.found import what_stands
 from app.reconstruct.pair import check_pair
 from app.reconstruct.short_mean import with_short_mean
+from app.reconstruct.unstated import past_objects
 from core.camera_noise import frame_variance, scattered_variance
 from core.displacement import resolve_window_px, window_centres
 from core.drift import Similarity, move_image
@@ -28,23 +30,27 @@ class Measurement:
     """What two captures say: the shift of every view, with the captures it was measured on.
 
     `images` are what a data term of single pixels compares: the reference, moved by the drift, and the flow.
-    They are there only where the scene asks for such a term. `notes` tell how the drift was found.
+    They are there only where the scene asks for such a term. `notes` tell how the drift was found. `found` is what
+    stands before the wall and is not stated; `scene` is the stated one with those of it whose place is seen.
     """
 
     captures: CapturePair
     shifts: tuple[ShiftMeasurement, ...]
     drifts: tuple[Similarity, ...]
     notes: tuple[str, ...]
+    scene: Scene
     images: tuple[ImagePair, ...] = ()
+    found: tuple[Found, ...] = ()
 
 
 def measure(captures: CapturePair, scene: Scene) -> Measurement:
     """Measure every view of a reference and a flow. Raises BadInputError, SettingError."""
     reference, flow = captures.reference, captures.flow
     _check_captures(reference, flow, scene)
+    standing = what_stands(scene, [image.mean for image in reference.images])
     shifts, drifts, notes = [], [], []
     for index, view in enumerate(scene.views):
-        shift, drift, note = _measure_view(scene, index, view, captures)
+        shift, drift, note = _measure_view(scene, index, view, captures, standing.covered[index])
         shift, averaged = with_short_mean(
             shift, captures, index, lambda one, n=index, v=view: _variance(one, n, v)
         )
@@ -54,7 +60,11 @@ def measure(captures: CapturePair, scene: Scene) -> Measurement:
     images: tuple[ImagePair, ...] = ()
     if scene.solve.data_term == "warped":
         images = tuple(_pair(view, n, captures, drifts[n]) for n, view in enumerate(scene.views))
-    return Measurement(captures, tuple(shifts), tuple(drifts), tuple(notes), images)
+    if standing.things:
+        shifts = past_objects(standing.scene, shifts)
+    return Measurement(
+        captures, tuple(shifts), tuple(drifts), tuple(notes), standing.scene, images, standing.things
+    )
 
 
 def _pair(view: View, index: int, captures: CapturePair, drift: Similarity) -> ImagePair:
@@ -75,7 +85,7 @@ def _variance(capture: Capture, index: int, view: View) -> np.ndarray:
 
 
 def _measure_view(
-    scene: Scene, index: int, view: View, captures: CapturePair
+    scene: Scene, index: int, view: View, captures: CapturePair, covered: np.ndarray
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     exposures = _exposures(scene, index, captures.reference, captures.flow)
     check_pair(captures.reference, captures.flow, index, exposures.variance)
@@ -92,7 +102,6 @@ def _measure_view(
         found = between_references(captures, scene, index)
         prior, said = found.at(_share(captures.reference, captures.flow, captures.after)), f"{found.said} "
     shift, drift, note = without_known_drift(exposures, in_room, beyond & _whole(centres, shape), prior)
-    covered = covered_windows(scene, index, captures.reference.images[index].mean, window_px)
     return _in_room(shift, in_room, covered, drift, said + note)
 
 
