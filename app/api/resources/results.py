@@ -247,6 +247,7 @@ def _found(one: Found, experiment: Experiment) -> FoundResource:
         sentence=one.sentence,
         lower_m=list(one.box.lower_m),
         upper_m=list(one.box.upper_m),
+        solved=one.solved,
         answer=answer_of(one.box, experiment.settings.scene.room.lower_m) if entered else None,
         entry=one.entry,
     )
