@@ -9,7 +9,7 @@ import pytest
 from app.experiment.found import found_in
 from app.files.toml import to_plain
 from app.reconstruct.cover import covered_windows
-from app.reconstruct.found import found_things
+from app.reconstruct.found import found_things, what_stands
 from app.rig.nuisances import spoiled
 from app.rig.rendered import with_objects
 from app.simulate.worlds import IDEAL, LAB
@@ -18,7 +18,7 @@ from core.geometry import Box, crop, looking_along_y
 from core.objects import RoomObject
 from core.rays.visibility import hidden_by_objects, sees_wall
 from core.render import render_reference
-from core.scene import FixedTexture, Scene, View
+from core.scene import FixedTexture, ProjectedPattern, Scene, SolveModel, View, WaveletPattern
 
 WINDOW_PX = 8
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(4.0, 3.0, 2.6))
@@ -32,7 +32,8 @@ SHELF = RoomObject(name="shelf", lower_m=(2.2, 2.6, 1.6), upper_m=(3.4, 3.0, 2.0
 
 
 def room(objects=()):
-    return Scene(room=ROOM, views=(View(camera=CAMERA),), light=FixedTexture(), objects=objects)
+    solve = SolveModel(window_px=WINDOW_PX)
+    return Scene(room=ROOM, views=(View(camera=CAMERA),), light=FixedTexture(), objects=objects, solve=solve)
 
 
 def seen(scene, things, seed=0, world=IDEAL):
@@ -86,7 +87,7 @@ def test_a_person_whose_foot_is_seen_stands_where_it_stands(world):
     scene = room((DESK,))
     _, (one,) = found(scene, seen(scene, (PERSON, DESK), 3, world))
 
-    assert one.depth == "seen"
+    assert (one.depth, one.solved) == ("seen", True)
     assert one.box.name == "found 1"
     # A window is 0.06 m on the wall; its depth is taken, not seen.
     np.testing.assert_allclose(one.box.lower_m, PERSON.lower_m, atol=0.08)
@@ -99,7 +100,7 @@ def test_the_foot_below_the_picture_is_told():
     scene = replace(room(), views=(View(camera=low),))
     _, (one,) = found(scene, seen(scene, (PERSON,)))
 
-    assert one.depth == "at most"
+    assert (one.depth, one.solved) == ("at most", False)
     assert "or nearer to the camera" in one.sentence
     assert one.box.lower_m[1] > PERSON.lower_m[1]
 
@@ -112,6 +113,28 @@ def test_a_shelf_hangs_at_the_wall():
     assert one.box.upper_m[1] == ROOM.upper_m[1]
     assert one.box.lower_m[2] > 1.5
     assert overlap(one.box, SHELF) > 0.8
+
+
+def test_in_a_projectors_light_the_shadow_is_told_and_nothing_is_solved_with_it():
+    projector = replace(CAMERA, position_m=(2.2, -2.0, 1.9), width_px=1200, height_px=1200)
+    light = ProjectedPattern(pattern=WaveletPattern(finest_px=4.0), projector=projector)
+    scene = replace(room(), light=light)
+    covered, things = found(scene, seen(scene, (PERSON,)))
+    assert covered[hidden_share((PERSON,)) == 1.0].any()
+    assert things
+    assert not any(one.solved for one in things)
+    assert all("shadow" in one.sentence for one in things)
+
+
+def test_what_is_found_stands_in_the_room_that_is_solved():
+    picture = seen(room(), (PERSON, SHELF))
+    standing = what_stands(room(), [picture])
+
+    # The person, whose foot is seen; not the shelf, of which only the direction is known.
+    assert [one.solved for one in standing.things] == [True, False]
+    (person,) = standing.scene.objects
+    assert (person.name, person.thermal) == ("found 1", "power")
+    assert person.power_std_w >= 50.0
 
 
 def test_two_things_are_two_and_named_apart_from_what_is_stated():
