@@ -3,7 +3,7 @@
 import json
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -83,15 +83,18 @@ def reconstruct(
         check_sequence(captures)
     on_stage("measure the shift of the pattern")
     measurement = measure(captures, known.scene)
-    problem = problem_of(known, measurement.shifts, measurement.images)
+    # With what was found to stand in the room.
+    standing = replace(known, scene=measurement.scene)
+    problem = problem_of(standing, measurement.shifts, measurement.images)
     on_stage("check the rendered reference against the captured one")
     checked = rendered_agreement(known.scene, captures.reference)
     on_stage(f"solve ({preset})")
     solution = solved(solve, problem, watch)
     if sequence:
-        solution = with_departures(solution, known.scene, measurement, watch)
+        solution = with_departures(solution, measurement, watch)
     on_stage("keep the result")
-    told = [known.optics, *aged(experiment, captures), *measurement.notes, checked, *solution.notes]
+    stands = [one.sentence for one in measurement.found]
+    told = [known.optics, *aged(experiment, captures), *measurement.notes, *stands, checked, *solution.notes]
     result = into or _new_folder(experiment, preset)
     manifest = _manifest(experiment, preset, measurement, solution, told, time.perf_counter() - started)
     finding = Finding(
@@ -132,6 +135,7 @@ def _manifest(
         "advice": solution.outcome.value,
         "solver_s": solution.solver_s,
         "assumed": assumed,
+        "found": to_plain(measurement.found),
         "wall_s": wall_s,
         "captures": captures.names,
         "bursts": [burst.folder.name for burst in captures.bursts],

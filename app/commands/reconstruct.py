@@ -67,11 +67,14 @@ def reconstruct(
         "advice": done.solution.outcome.value,
         "solver_s": done.solution.solver_s,
         "wall_s": done.wall_s,
+        "found": [one.sentence for one in done.measurement.found],
     }
     if as_json:
         typer.echo(json.dumps(summary, indent=1))
     else:
         typer.echo(f"{summary['outcome']}: {summary['advice']} Solver {done.solution.solver_s:.1f} s.")
+        for one in done.measurement.found:
+            typer.echo(one.sentence)
         typer.echo(f"result {summary['result']}\nreport {summary['report']}")
 
 

@@ -1,19 +1,22 @@
 """Which windows does something stand before? Where the reference does not show the pattern that the scene states.
 
 A thing that stands still is in both pictures and shows no shift: the pair of them cannot tell. The reference, beside
-what the scene would show, can. A block of windows is covered if its correlation with the rendered pattern is far
-below that of the picture's other blocks.
+what the scene would show, can. A block of a few windows that shows nothing of the rendered pattern is covered, with
+every window in it; so is a window beside it that lacks a good part of the pattern.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
+from scipy import ndimage
 
 from core.displacement import window_centres
 from core.rays.visibility import sees_wall
 from core.render import pixel_renderer
 from core.scene import Scene
 
-# Pixels compared in each block: evenly spaced.
+# Pixels compared in each window: evenly spaced.
 _ACROSS = 10
 # A block is wide enough for many features of the finest pattern.
 _BLOCK_PX = 24
@@ -21,47 +24,77 @@ _BLOCK_PX = 24
 _SIGMAS = 4.0
 # Below this median the scene's pattern is not what the camera sees, and nothing can be said of single windows.
 _LEAST_CORRELATION = 0.3
+# Beside a covered block a window is left out that lacks more of its pattern than this: its shift would be as wrong.
+_MISSING = 0.25
+
+
+@dataclass(frozen=True)
+class _Likeness:
+    """How the picture goes with the rendered pattern: Fisher's z, and how much of the pattern is in it."""
+
+    z: Float[np.ndarray, "rows columns"]
+    gain: Float[np.ndarray, "rows columns"]
 
 
 def covered_windows(
     scene: Scene, view: int, reference: Float32[np.ndarray, "rows cols"], window_px: int
 ) -> Bool[np.ndarray, " windows"]:
-    """For each whole window of the picture, whether something stands before the wall there."""
-    block_px = window_px * -(-_BLOCK_PX // window_px)
-    centres = window_centres(reference.shape, block_px)
-    chosen = sees_wall(scene, view, centres, margin_px=0.5 * block_px)
-    windows = window_centres(reference.shape, window_px)
-    if chosen.sum() < 3:
-        return np.zeros(len(windows), bool)
-    correlation = _correlations(scene, view, reference, centres[chosen], block_px)
-    z = np.arctanh(np.clip(correlation, -0.999, 0.999))
-    usual = float(np.median(z))
+    """For each whole window of the picture, whether something unstated stands before the wall."""
+    centres = window_centres(reference.shape, window_px)
+    rows, columns = (n // window_px for n in reference.shape)
+    tested = sees_wall(scene, view, centres, margin_px=0.5 * window_px)
+    if tested.sum() < 3:
+        return np.zeros(len(centres), bool)
+    sums = np.zeros((6, len(centres)))
+    sums[:, tested] = _sums(scene, view, reference, centres[tested], window_px)
+    on_wall, sums = tested.reshape(rows, columns), sums.reshape(6, rows, columns)
+    return (_covered(sums, on_wall, _windows_across(window_px)) & on_wall).ravel()
+
+
+def _windows_across(window_px: int) -> int:
+    """How many windows a block is wide: odd, so that it has a middle one."""
+    return 1 if window_px >= _BLOCK_PX else 2 * (-(-_BLOCK_PX // window_px) // 2) + 1
+
+
+def _covered(
+    sums: Float[np.ndarray, "6 rows columns"], on_wall: Bool[np.ndarray, "rows columns"], across: int
+) -> Bool[np.ndarray, "rows columns"]:
+    """Windows in a block without the pattern, and those beside them that lack a part of theirs."""
+    square = np.ones((across, across))
+    block = _likeness(np.stack([ndimage.correlate(one, square, mode="constant") for one in sums]))
+    usual, usual_gain = (float(np.median(values[on_wall])) for values in (block.z, block.gain))
     if np.tanh(usual) < _LEAST_CORRELATION:
-        return np.zeros(len(windows), bool)
-    scatter = max(1.4826 * float(np.median(np.abs(z - usual))), (_ACROSS**2 - 3) ** -0.5)
-    covered = np.zeros(len(centres), bool)
-    covered[chosen] = z < usual - _SIGMAS * scatter
-    rows, columns = (n // block_px for n in reference.shape)
-    row, column = (
-        np.minimum(windows[:, a] // block_px, n - 1).astype(int) for a, n in ((1, rows), (0, columns))
-    )
-    return covered.reshape(rows, columns)[row, column]
+        return np.zeros_like(on_wall)
+    scatter = 1.4826 * float(np.median(np.abs(block.z[on_wall] - usual)))
+    unlike = block.z < usual - _SIGMAS * max(scatter, (_ACROSS**2 - 3) ** -0.5)
+    # Half of what one free column of windows in the block would show.
+    bare = on_wall & unlike & (block.gain < usual_gain / (2 * across))
+    covered = np.asarray(ndimage.binary_dilation(bare, square), bool)
+    beside = np.asarray(ndimage.binary_dilation(covered, np.ones((3, 3))), bool)
+    return covered | (beside & (_likeness(sums).gain < (1.0 - _MISSING) * usual_gain))
 
 
-def _correlations(
+def _likeness(sums: Float[np.ndarray, "6 rows columns"]) -> _Likeness:
+    """From the sums of 1, a, b, aa, bb and ab: a rendered, b seen."""
+    count, a, b, aa, bb, ab = sums
+    count = np.maximum(count, 1.0)
+    together, own, seen = ab - a * b / count, aa - a**2 / count, bb - b**2 / count
+    correlation = together / np.sqrt(np.maximum(own * seen, 1e-30))
+    return _Likeness(np.arctanh(np.clip(correlation, -0.999, 0.999)), together / np.maximum(own, 1e-30))
+
+
+def _sums(
     scene: Scene,
     view: int,
     picture: Float32[np.ndarray, "rows cols"],
-    centres_px: Float[np.ndarray, "blocks 2"],
-    block_px: int,
-) -> Float[np.ndarray, " blocks"]:
-    """Of the picture with the rendered pattern, over evenly spaced pixels of each block."""
-    steps = np.unique(np.linspace(0, block_px - 1, _ACROSS).round()) - (block_px - 1) / 2
+    centres_px: Float[np.ndarray, "windows 2"],
+    window_px: int,
+) -> Float[np.ndarray, "6 windows"]:
+    """Of 1, a, b, aa, bb and ab over evenly spaced pixels of each window: a as the scene renders it, b as seen."""
+    steps = np.unique(np.linspace(0, window_px - 1, _ACROSS).round()) - (window_px - 1) / 2
     offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     pixels = np.rint((centres_px[:, None, :] + offsets).reshape(-1, 2))
     rendered = np.asarray(pixel_renderer(scene, view, pixels).reference(), float)
     seen = picture[pixels[:, 1].astype(int), pixels[:, 0].astype(int)].astype(float)
-    pair = [values.reshape(len(centres_px), -1) for values in (rendered, seen)]
-    a, b = (values - values.mean(1, keepdims=True) for values in pair)
-    size = np.sqrt((a**2).sum(1) * (b**2).sum(1))
-    return (a * b).sum(1) / np.maximum(size, 1e-30)
+    a, b = (values.reshape(len(centres_px), -1) for values in (rendered, seen))
+    return np.stack([one.sum(axis=1) for one in (np.ones_like(a), a, b, a * a, b * b, a * b)])

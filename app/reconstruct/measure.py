@@ -8,10 +8,12 @@ from scipy.ndimage import uniform_filter
 
 from app.errors import BadInputError
 from app.experiment.captures import Capture, CapturePair, load_capture
-from app.reconstruct.cover import covered_windows
+from app.experiment.found import Found
 from app.reconstruct.drift import Agreement, Exposures, agreement, mount, without_known_drift
+from app.reconstruct.found import what_stands
 from app.reconstruct.pair import check_pair
 from app.reconstruct.short_mean import with_short_mean
+from app.reconstruct.unstated import past_objects
 from core.camera_noise import frame_variance, scattered_variance
 from core.displacement import resolve_window_px, window_centres
 from core.drift import Similarity, move_image
@@ -31,24 +33,28 @@ class Measurement:
     `bursts` tell, for each burst of a sequence and each view, how the pattern moved from the mean of all; there are
     none of a single burst. `images` are what a data term of single pixels compares: the reference, moved by the
     drift, and the flow. They are there only where the scene asks for such a term. `notes` tell how the drift was
-    found.
+    found. `found` is what stands before the wall and is not stated; `scene` is the stated one with those of it whose
+    place is seen.
     """
 
     captures: CapturePair
     shifts: tuple[ShiftMeasurement, ...]
     drifts: tuple[Similarity, ...]
     notes: tuple[str, ...]
+    scene: Scene
     images: tuple[ImagePair, ...] = ()
     bursts: tuple[tuple[ShiftMeasurement, ...], ...] = ()
+    found: tuple[Found, ...] = ()
 
 
 def measure(captures: CapturePair, scene: Scene) -> Measurement:
     """Measure every view of a reference and a flow. Raises BadInputError, SettingError."""
     reference, flow = captures.reference, captures.flow
     _check_captures(reference, flow, scene)
+    standing = what_stands(scene, [image.mean for image in reference.images])
     shifts, drifts, notes, views = [], [], [], []
     for index, view in enumerate(scene.views):
-        shift, drift, note = _measure_view(scene, index, view, captures)
+        shift, drift, note = _measure_view(scene, index, view, captures, standing.covered[index])
         bursts = _burst_shifts(scene, index, captures, shift)
         shift, averaged = with_short_mean(shift, bursts, captures)
         views.append(bursts)
@@ -58,8 +64,13 @@ def measure(captures: CapturePair, scene: Scene) -> Measurement:
     images: tuple[ImagePair, ...] = ()
     if scene.solve.data_term == "warped":
         images = tuple(_pair(view, n, captures, drifts[n]) for n, view in enumerate(scene.views))
+    if standing.things:
+        shifts = past_objects(standing.scene, shifts)
+        views = [_in_windows(*of) for of in zip(views, shifts, strict=True)]
     bursts = tuple(zip(*views, strict=True))
-    return Measurement(captures, tuple(shifts), tuple(drifts), tuple(notes), images, bursts)
+    return Measurement(
+        captures, tuple(shifts), tuple(drifts), tuple(notes), standing.scene, images, bursts, standing.things
+    )
 
 
 def _pair(view: View, index: int, captures: CapturePair, drift: Similarity) -> ImagePair:
@@ -80,7 +91,7 @@ def _variance(capture: Capture, index: int, view: View) -> np.ndarray:
 
 
 def _measure_view(
-    scene: Scene, index: int, view: View, captures: CapturePair
+    scene: Scene, index: int, view: View, captures: CapturePair, covered: np.ndarray
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     exposures = _exposures(scene, index, captures.reference, captures.flow)
     check_pair(captures.reference, captures.flow, index, exposures.variance)
@@ -90,7 +101,6 @@ def _measure_view(
         found = between_references(captures, scene, index)
         prior, said = found.at(_share(captures.reference, captures.flow, captures.after)), f"{found.said} "
     shift, drift, note = without_known_drift(exposures, in_room, beyond, prior)
-    covered = covered_windows(scene, index, captures.reference.images[index].mean, exposures.window_px)
     return _in_room(shift, in_room, covered, drift, said + note)
 
 
@@ -125,6 +135,13 @@ def _burst_shifts(
         alone, _, _ = without_known_drift(exposures, in_room, beyond, mount(view.drift_std_px))
         found.append(alone.at(chosen))
     return tuple(found)
+
+
+def _in_windows(
+    bursts: tuple[ShiftMeasurement, ...], shift: ShiftMeasurement
+) -> tuple[ShiftMeasurement, ...]:
+    """The bursts in the windows of `shift` alone."""
+    return tuple(burst.at(_among(burst.centres_px, shift.centres_px)) for burst in bursts)
 
 
 def _among(centres_px: Float[np.ndarray, "windows 2"], chosen_px: Float[np.ndarray, "some 2"]) -> Mask:

@@ -8,7 +8,6 @@ from app.errors import BadInputError
 from app.experiment.captures import CapturePair
 from app.reconstruct.measure import Measurement
 from core.result import Departures, Solution
-from core.scene import Scene
 from core.solve.sequence.departures import LEAST_BURSTS, solve_departures
 from core.watch import Watch
 
@@ -23,8 +22,9 @@ def check_sequence(captures: CapturePair) -> None:
         )
 
 
-def with_departures(solution: Solution, scene: Scene, measurement: Measurement, watch: Watch) -> Solution:
+def with_departures(solution: Solution, measurement: Measurement, watch: Watch) -> Solution:
     """The solution of a sequence's mean with its bursts' departures, and a sentence on them. Raises StoppedError."""
+    scene = measurement.scene
     found = solve_departures(scene, solution, measurement.bursts, _began_s(measurement.captures), watch)
     whole = replace(solution, departures=found, notes=(*solution.notes, _told(found)))
     return whole.without_objects(scene.objects)

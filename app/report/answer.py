@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from app.errors import explained
+from app.experiment.found import found_in
 from app.report.finding import Finding
 from app.report.indoor import Quantity
 from app.report.indoor import told as line_of
@@ -103,6 +104,7 @@ def _advice(finding: Finding) -> Iterable[str]:
     if solution.outcome in (Outcome.step_limit, Outcome.time_limit, Outcome.nonfinite):
         yield f"The solve did not come to its end. {solution.outcome.value}"
     yield from (note for note in finding.manifest.get("assumed", ()) if "istrust" in note)
+    yield from (one.sentence for one in found_in(finding.manifest))
     if solution.velocity_m_s is None:
         yield "Reconstruct with the preset standard: it finds the velocity as well."
     if not any(isinstance(part, PointSensors) for part in scene.boundary):

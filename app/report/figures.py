@@ -8,8 +8,10 @@ from typing import Literal
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from app.experiment.found import Found
 from core.comfort import CELSIUS_K
 from core.problem import ShiftMeasurement
 from core.result import Solution
@@ -18,6 +20,8 @@ from core.result import Solution
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"
 # Cold and warm as people think of them.
 AIR = "RdYlBu_r"
+# An outline that is told from grey by its lightness as well.
+_MARK = "#ff7f0e"
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,29 @@ def images_figure(reference: np.ndarray, flow: np.ndarray) -> Figure:
     figure.colorbar(drawn, ax=axes[2], label="part of full scale", shrink=0.85)
     for axis in axes:
         axis.set_axis_off()
+    return figure
+
+
+def found_figure(reference: np.ndarray, things: Sequence[Found]) -> Figure:
+    """The reference with an outline and its name for each thing that was found in it."""
+    figure = Figure(figsize=(9, 9 * reference.shape[0] / reference.shape[1]), layout="constrained")
+    axis = figure.subplots()
+    step = max(1, reference.shape[1] // 1200)
+    axis.imshow(
+        reference[::step, ::step],
+        cmap="gray",
+        vmin=0,
+        vmax=float(np.percentile(reference, 99.5)),
+        extent=(-0.5, reference.shape[1] - 0.5, reference.shape[0] - 0.5, -0.5),
+    )
+    for one in things:
+        left, top, right, bottom = one.outline_px
+        axis.add_patch(Rectangle((left, top), right - left, bottom - top, fill=False, lw=2, edgecolor=_MARK))
+        axis.annotate(
+            one.box.name, (0.5 * (left + right), top), (0, 4), textcoords="offset points", ha="center",
+            bbox={"facecolor": "white", "edgecolor": _MARK, "pad": 2},
+        )  # fmt: skip
+    axis.set_axis_off()
     return figure
 
 

@@ -14,12 +14,14 @@ from app.calibrate.folder import CalibrationFolder
 from app.calibrate.page import figures, measured_model
 from app.errors import BadInputError, explained
 from app.experiment.folder import Experiment, open_experiment
+from app.experiment.found import found_in
 from app.files.durable import write_text
 from app.report.answer import advice, summary
 from app.report.beside import places, rows
 from app.report.figures import (
     as_data_uri,
     error_figure,
+    found_figure,
     images_figure,
     shift_figure,
     slices_figure,
@@ -98,6 +100,7 @@ def _sections(finding: Finding) -> list[Section]:
     made = [
         _air(finding),
         _indoor(finding),
+        _drawn("What stands before the wall and is not stated", lambda: _found(finding)),
         _listed("What to do to know better", lambda: ((sentence,) for sentence in advice(finding))),
         _listed(
             "Against the truth", lambda: score_rows(finding), heads=("quantity", "error", "trivial answers")
@@ -144,6 +147,16 @@ def _images(finding: Finding) -> Iterable[Picture]:
             as_data_uri(images_figure(before.mean, after.mean)),
             f"{view.name}: mean images, drawn at reduced size. The shift is too small to be seen in them.",
         )
+
+
+def _found(finding: Finding) -> Iterable[Picture]:
+    """The reference with what was found in it, for each view that has something."""
+    everything = found_in(finding.manifest)
+    for view in sorted({one.view for one in everything}):
+        things = [one for one in everything if one.view == view]
+        reference = finding.captures().reference.images[view].mean
+        said = " ".join(f"{one.box.name}: {one.sentence}" for one in things)
+        yield Picture(as_data_uri(found_figure(reference, things)), said)
 
 
 def _shifts(finding: Finding) -> Iterable[Picture]:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from app.errors import BadInputError
 from app.experiment.folder import ExperimentSettings
@@ -210,6 +211,14 @@ def object_of(item: ObjectAnswer, number: int, corner_m: Vector3 = (0.0, 0.0, 0.
         return ready
     std_w = ready.power_std_w if item.heat_deviation is None else item.heat_deviation
     return replace(ready, thermal="power", power_w=power_w, power_std_w=std_w)
+
+
+def answer_of(box: RoomObject, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> dict[str, Any]:
+    """A box that passes no heat as an answer, its place measured from the room's corner."""
+    (x0, y0, z0), (x1, y1, _) = box.lower_m, box.upper_m
+    foot_m = (0.5 * (x0 + x1) - corner_m[0], 0.5 * (y0 + y1) - corner_m[1], z0 - corner_m[2])
+    position, size = ([f"{value:.12g} m" for value in place] for place in (foot_m, box.size_m))
+    return {"kind": "box", "position": position, "size": size}
 
 
 def _inlet(item: SupplyAnswer, room: Box) -> Inlet:

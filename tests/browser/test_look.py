@@ -6,10 +6,12 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from app.client import Client
-from app.experiment.folder import Experiment, write_manifest
+from app.experiment.folder import Experiment, read_manifest, write_manifest
+from app.experiment.found import Found
 from app.experiment.results import write_result
 from app.files.durable import write_json, write_text
 from app.files.toml import to_plain
@@ -198,6 +200,46 @@ def test_an_object_is_grey_and_a_plane_is_dragged_by_its_grip(station: Station, 
     page.get_by_role("checkbox", name="Plane across z").check()
     expect(page.locator(".grip:not([hidden])")).to_have_count(2)
     snapshot(page, "look-desk")
+    assert watched.complaints == []
+
+
+def test_what_was_found_goes_to_the_rooms_editor_by_one_click(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        answers = next(one.answers for one in client.templates() if one.template == "sample")
+        name = client.create_from_answers(answers).experiment
+        without = client.create_experiment(camera_px=64).experiment
+    folders = station.app.state.services.folders
+    box = RoomObject(name="found 1", lower_m=(0.5, -0.5, 0.0), upper_m=(0.9, -0.1, 1.2))
+    sentence = "Something that the scene does not state hides 3.0 % of the wall."
+    thing = Found(0, 0.03, (0.4, 1.0), (0.0, 1.2), (10.0, 20.0, 30.0, 40.0), "seen", box, True, sentence)
+    for one in (without, name):
+        experiment = folders.open(one)
+        keep(experiment, "20260101T000000-standard", room(), "standard", 1.0)
+        folder = experiment.results_folder / "20260101T000000-standard"
+        write_manifest(folder, read_manifest(folder) | {"found": to_plain((thing,))})
+    watched = opens(f"{station.address}")
+    page = watched.page
+    page.get_by_label("Experiment").select_option(name)
+    page.get_by_role("button", name="Look", exact=True).click()
+    expect(page.locator("main")).to_contain_text(sentence)
+    snapshot(page, "look-found")
+    page.get_by_role("button", name="Add what stands here: found 1").click()
+    group = page.get_by_role("group", name="object 1")
+    expect(group.get_by_label("Size along z")).to_have_value("1.2 m")
+    page.locator("button.next", has_text="Change the room").click()
+    expect(page.locator("main")).to_contain_text("made with another room")
+    (stated,) = folders.open(name).settings.scene.objects
+    assert stated.lower_m == pytest.approx(box.lower_m)
+    # Once more the editor opens with what is there, and nothing besides.
+    page.get_by_role("button", name="Rig", exact=True).click()
+    page.get_by_role("button", name="Edit room").click()
+    expect(page.get_by_role("group", name="object 1")).to_be_visible()
+    expect(page.get_by_role("group", name="object 2")).to_have_count(0)
+
+    page.get_by_role("button", name="Look", exact=True).click()
+    page.get_by_label("Experiment").select_option(without)
+    expect(page.locator("pre")).to_contain_text("[[scene.objects]]")
+    expect(page.get_by_role("button", name="Add what stands here")).to_have_count(0)
     assert watched.complaints == []
 
 

@@ -43,6 +43,22 @@ class FieldResource(Strict):
     mean: float
 
 
+class FoundResource(Strict):
+    """Something before the wall that was not stated, and the box that would hide as much.
+
+    `solved`: the air was solved with it. `answer` is the object to add to the experiment's answers; None where its
+    room was not entered as answers. `entry` states the box in experiment.toml.
+    """
+
+    name: str
+    sentence: str
+    lower_m: list[float]
+    upper_m: list[float]
+    solved: bool
+    answer: dict[str, Any] | None
+    entry: str
+
+
 class ResultResource(Strict):
     """A result: its grid, its fields, how it ended, and the manifest that says where it came from.
 
@@ -59,6 +75,7 @@ class ResultResource(Strict):
     advice: str
     solver_s: float
     notes: list[str]
+    found: list[FoundResource]
     manifest: dict[str, Any]
 
 

@@ -13,6 +13,7 @@ from app.api.models.results import (
     ComparisonResource,
     FieldResource,
     Form,
+    FoundResource,
     PresetResource,
     ReadingResource,
     ResultLine,
@@ -36,8 +37,11 @@ from app.api.wire.volumes import (
     pack,
 )
 from app.errors import BadInputError
-from app.experiment.folder import read_manifest
+from app.experiment.folder import Experiment, read_manifest
+from app.experiment.found import Found, found_in
 from app.files.reading import reading
+from app.setup.experiment import ANSWERS_FILE
+from app.setup.scene import answer_of
 
 router = APIRouter(tags=["results"])
 NUMBERS = body(
@@ -65,7 +69,7 @@ def list_results(given: Given, experiment: Identifier) -> list[ResultLine]:
 def read_result(given: Given, experiment: Identifier, result: Identifier) -> ResultResource:
     """Return one result without its numbers."""
     folder, shown = _shown(given, experiment, result)
-    solution = shown.solution
+    solution, manifest, of = shown.solution, read_manifest(folder), given.folders.open(experiment)
     return ResultResource(
         result=result,
         x_m=solution.x_m.tolist(),
@@ -77,7 +81,8 @@ def read_result(given: Given, experiment: Identifier, result: Identifier) -> Res
         advice=solution.outcome.value,
         solver_s=solution.solver_s,
         notes=list(solution.notes),
-        manifest=read_manifest(folder),
+        found=[_found(one, of) for one in found_in(manifest)],
+        manifest=manifest,
     )
 
 
@@ -254,6 +259,19 @@ def _field(volume: Volume) -> FieldResource:
         low=float(low),
         high=float(high),
         mean=float(np.nanmean(values, dtype="float64")),
+    )
+
+
+def _found(one: Found, experiment: Experiment) -> FoundResource:
+    entered = (experiment.folder / ANSWERS_FILE).is_file()
+    return FoundResource(
+        name=one.box.name,
+        sentence=one.sentence,
+        lower_m=list(one.box.lower_m),
+        upper_m=list(one.box.upper_m),
+        solved=one.solved,
+        answer=answer_of(one.box, experiment.settings.scene.room.lower_m) if entered else None,
+        entry=one.entry,
     )
 
 

@@ -2,20 +2,24 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from app.experiment.captures import newest_pair, write_capture
 from app.experiment.folder import ExperimentSettings, create_experiment, write_manifest
+from app.experiment.found import Found
 from app.experiment.results import write_result
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.experiment.shift_files import write_shifts
 from app.files.provenance import provenance
+from app.files.toml import to_plain
 from app.report.finding import Finding, read_finding
 from app.report.page import render_report, write_report
 from calibration.record import Record, SeenBoard, record_to_json
 from core.geometry import Box, looking_along_y
+from core.objects import RoomObject
 from core.problem import ShiftMeasurement
 from core.result import Solution
 from core.scene import FixedTexture, Inlet, Patch, Scene, View
@@ -113,6 +117,20 @@ def test_a_picture_and_a_shift_that_cannot_be_read_cost_their_own_sections_only(
     assert "shift-0.nc cannot be read" in moved
     # The room and the planes of its air are drawn.
     assert page.count("data:image/png") == 2
+
+
+def test_what_was_found_before_the_wall_is_drawn_and_told(kept):
+    box = RoomObject(name="found 1", lower_m=(0.0, 0.2, -1.0), upper_m=(0.4, 0.6, 0.1))
+    thing = Found(
+        0, 0.1, (0.0, 0.5), (-1.0, 0.1), (64.0, 40.0, 88.0, 90.0), "seen", box, True, "It stands there."
+    )
+    told = replace(kept, manifest={**kept.manifest, "found": to_plain((thing,))})
+    page = render_report(told)
+    assert missing(page) == []
+    assert "found 1: It stands there." in page
+    assert page.count("data:image/png") == render_report(kept).count("data:image/png") + 1
+    # What to do comes first from there.
+    assert "<td>It stands there.</td>" in page
 
 
 def test_a_result_of_an_older_program_is_reported_with_what_it_has(kept):

@@ -1,5 +1,6 @@
 """People and furniture as answers: kinds have their size and heat, and what is told replaces it."""
 
+import json
 from typing import get_args
 
 import pytest
@@ -7,8 +8,8 @@ import pytest
 from app.experiment.folder import open_experiment
 from app.setup.answers import ObjectAnswer
 from app.setup.experiment import new_experiment, read_answers, template
-from app.setup.scene import settings_of
-from core.objects import READY
+from app.setup.scene import answer_of, object_of, settings_of
+from core.objects import READY, RoomObject
 
 PEOPLE = """
 [[object]]
@@ -53,3 +54,17 @@ def test_an_experiment_made_from_answers_keeps_its_people(tmp_path):
 
 def test_every_kind_is_offered():
     assert set(get_args(ObjectAnswer.model_fields["kind"].annotation)) == set(READY)
+
+
+def test_a_box_that_was_found_is_answered_from_the_rooms_corner():
+    box = RoomObject(name="found 1", lower_m=(0.706, 1.068, 0.0), upper_m=(1.138, 1.5, 1.208))
+    corner_m = (-1.2, -1.5, 0.0)
+
+    answer = ObjectAnswer.model_validate_json(json.dumps(answer_of(box, corner_m)))
+    made = object_of(answer, 0, corner_m)
+
+    assert answer.position == pytest.approx((2.122, 2.784, 0.0))
+    assert made.thermal == "adiabatic"
+    assert made.lower_m == pytest.approx(box.lower_m, abs=1e-9)
+    # It touches the back wall and does not reach into it.
+    assert made.upper_m == pytest.approx(box.upper_m, abs=1e-9)

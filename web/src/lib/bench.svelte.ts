@@ -66,6 +66,9 @@ class Bench {
   /** Whether the new experiment is for pictures that another camera took. */
   importing = $state(false);
 
+  /** What was found in a result and goes to the room's editor, as an answer. */
+  adding: Record<string, unknown> | null = null;
+
   /** The next step of a page that has its own. */
   offered = $state.raw<Step | null>(null);
 
@@ -298,6 +301,11 @@ class Bench {
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
     this.done = `Saved ${link.download}`;
+  }
+
+  /** Opens the room's editor with one more object, which nobody keeps until the room is changed there. */
+  state(answer: Record<string, unknown>): void {
+    [this.adding, this.page] = [answer, "Room"];
   }
 
   /** Opens the report in a window of its own; a refusal is shown here, not there. */

@@ -69,10 +69,13 @@ class Draft {
       try {
         const found = await ask("GET /experiments/{experiment}/answers", { experiment });
         [this.answers, this.revision] = [found.answers, found.revision];
+        if (bench.adding) this.add("object", bench.adding);
       } catch (error) {
         if (!(error instanceof ProblemError) || error.problem.code !== "bad_input") throw error;
         this.refused = error.problem.cause ?? error.problem.detail;
         return;
+      } finally {
+        bench.adding = null;
       }
     } else this.answers = JSON.parse(localStorage.getItem(KEPT) ?? "{}") as Tree;
     this.later();

@@ -41,7 +41,7 @@ export function openingsOf(settings: unknown): Opening[] {
 }
 
 /** The six faces of a box; its name is on the top. */
-function facesOf(thing: Thing): Opening[] {
+export function facesOf(thing: Thing): Opening[] {
   return ["z_max", "z_min", "x_min", "x_max", "y_min", "y_max"].map((wall): Opening => {
     const across = "xyz".indexOf(wall[0]!);
     const without = (corner: number[]) => corner.filter((_, axis) => axis !== across);

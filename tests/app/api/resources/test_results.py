@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import shutil
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,9 +13,12 @@ import pytest
 
 from app.api.wire.volumes import pack
 from app.client import Client, ServiceError
-from app.experiment.folder import save_settings, write_manifest
+from app.experiment.folder import read_manifest, save_settings, write_manifest
+from app.experiment.found import Found
 from app.experiment.results import write_result
+from app.files.toml import to_plain
 from app.volume.score import score_experiment
+from core.objects import RoomObject
 from core.result import Outcome, Solution
 from core.scene import PointSensors
 from tests.app.api.conftest import Live
@@ -65,6 +69,42 @@ def test_a_result_tells_its_grid_fields_and_end(airlens: Client, made: tuple[str
         ["straight rays"],
     )
     assert result.y_m == AXES[1].tolist()
+
+
+BOX = RoomObject(name="found 1", lower_m=(0.5, -0.5, 0.0), upper_m=(0.9, -0.1, 1.2))
+THING = Found(
+    0, 0.03, (0.4, 1.0), (0.0, 1.2), (10.0, 20.0, 30.0, 40.0), "seen", BOX, True, "Something stands."
+)
+
+
+def test_what_was_found_is_offered_where_the_room_was_entered_as_answers(
+    airlens: Client, live: Live, made: tuple[str, str]
+):
+    folder = live.app.state.services.folders.folder(made[0])
+    result = folder / "results" / made[1]
+    before = read_manifest(result)
+    assert airlens.result(*made).found == []
+    write_manifest(result, before | {"found": to_plain((THING,))})
+    (one,) = airlens.result(*made).found
+    assert (one.name, one.sentence, one.solved, one.answer) == ("found 1", "Something stands.", True, None)
+    assert "lower_m = [0.5, -0.5, 0.0]" in one.entry
+
+    answers = next(each.answers for each in airlens.templates() if each.template == "sample")
+    entered = airlens.create_from_answers(answers).experiment
+    there = live.app.state.services.folders.folder(entered) / "results" / "r1"
+    shutil.copytree(result, there)
+    (offered,) = airlens.result(entered, "r1").found
+    assert offered.answer is not None
+    changed = answers | {"object": [offered.answer]}
+    assert airlens.check_answers(changed, entered).mistakes == []
+    airlens.change_answers(entered, changed)
+    (stated,) = live.app.state.services.folders.open(entered).settings.scene.objects
+    assert stated.lower_m == pytest.approx(BOX.lower_m)
+
+    write_manifest(result, before | {"found": [{"view": "one"}]})
+    with pytest.raises(ServiceError, match="cannot be read"):
+        airlens.result(*made)
+    write_manifest(result, before)
 
 
 def test_volumes_and_slices_are_the_numbers_of_the_result(airlens: Client, made: tuple[str, str]):
