@@ -16,6 +16,8 @@ from app.experiment.shift_files import write_shifts
 from app.files.durable import write_text
 from app.files.provenance import provenance
 from app.files.toml import to_plain
+from app.plan.task import task_in
+from app.plan.under_way import UnderWay
 from app.reconstruct.agreement import rendered_agreement
 from app.reconstruct.measure import Measurement, measure
 from app.reconstruct.presets import AUTO, check_data_term, resolved, solved
@@ -32,7 +34,8 @@ from core.watch import Watch
 class Reconstruction:
     """A finished reconstruction: its folder, what was solved, and the air.
 
-    `no_report` says why there is no report, where there is none.
+    `no_report` says why there is no report, where there is none. `promised_s` is what was promised, None where
+    nothing was: all of it, the process' start too where that is known.
     """
 
     folder: Path
@@ -41,6 +44,7 @@ class Reconstruction:
     measurement: Measurement
     wall_s: float
     no_report: str = ""
+    promised_s: float | None = None
 
     @property
     def solution(self) -> Solution:
@@ -54,34 +58,41 @@ def reconstruct(
     *,
     watch: Watch = Watch(),
     into: Path | None = None,
+    start_s: float | None = None,
 ) -> Reconstruction:
     """Reconstruct the newest captures of an experiment. Raises BadInputError, SettingError, StoppedError.
 
     The result goes to a new folder among the experiment's results, or to `into`, which exists. A solver keeps in
     `watch.store` what it can go on from; one that finds there another problem's, or other settings', starts afresh.
+    Rows that are told say `left_s`, the seconds yet, where the machine's runs, a plan or the scene tell them; the
+    one before the captures are read says so in words (`promised`). `start_s` is what the process took until now,
+    where it serves this run alone. Promises are learned from every run that did not go on from an earlier one.
     """
-    started = time.perf_counter()
+    started, under_way = time.perf_counter(), UnderWay(start_s)
+    watch = under_way.watched(watch)
 
-    def on_stage(stage: str) -> None:
+    def on_stage(doing: str, stage: str, **more: str) -> None:
+        under_way.enter(stage)
         watch.check_stop()
-        watch.tell({"doing": stage})
+        watch.tell({"doing": doing, **more})
 
     experiment = open_experiment(folder)
-    on_stage("read what is known")
+    on_stage("read what is known", "read")
     known = known_of(experiment)
     preset = resolved(preset, known.scene)
     solve = preset_called(preset)
     check_data_term(preset, known.scene)
-    on_stage("read the captures")
+    under_way.begin(task_in(experiment, known, preset), afresh=not watch.store)
+    on_stage("read the captures", "read", promised=under_way.said)
     captures = newest_pair(experiment)
-    on_stage("measure the shift of the pattern")
+    on_stage("measure the shift of the pattern", "measure")
     measurement = measure(captures, known.scene)
     problem = problem_of(known, measurement.shifts, measurement.images)
-    on_stage("check the rendered reference against the captured one")
+    on_stage("check the rendered reference against the captured one", "measure")
     checked = rendered_agreement(known.scene, captures.reference)
-    on_stage(f"solve ({preset})")
+    on_stage(f"solve ({preset})", "solve")
     solution = solved(solve, problem, watch)
-    on_stage("keep the result")
+    on_stage("keep the result", "report")
     told = [known.optics, *aged(experiment, captures), *measurement.notes, checked, *solution.notes]
     result = into or _new_folder(experiment, preset)
     manifest = _manifest(experiment, preset, measurement, solution, told, time.perf_counter() - started)
@@ -89,10 +100,12 @@ def reconstruct(
         experiment, result.name, manifest, solution, lambda: measurement.shifts, lambda: captures
     )
     _keep(result, finding, measurement)
-    on_stage("report")
+    on_stage("report", "report")
     no_report = _reported(finding, result)
+    under_way.keep()
+    wall_s = time.perf_counter() - started
     return Reconstruction(
-        result, finding, problem, measurement, time.perf_counter() - started, no_report=no_report
+        result, finding, problem, measurement, wall_s, no_report=no_report, promised_s=under_way.promised_s
     )
 
 

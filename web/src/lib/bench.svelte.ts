@@ -55,6 +55,8 @@ class Bench {
   preset = $state("auto");
   /** What each running job says that it does. */
   stages = $state.raw<Record<string, string>>({});
+  /** When a job will end, as it told last: seconds since 1970. */
+  ends = $state.raw<Record<string, number>>({});
   done = $state("");
   /** Grows with everything that is told of a guided calibration. */
   guided = $state(0);
@@ -374,8 +376,9 @@ class Bench {
   }
 
   private progress(event: EventResource): void {
-    const { step, steps, stage } = event.body;
+    const { step, steps, stage, left_s } = event.body;
     if (event.job && typeof stage === "string") this.stages = { ...this.stages, [event.job]: stage };
+    if (event.job && typeof left_s === "number") this.ends = { ...this.ends, [event.job]: event.at_s + left_s };
     if (typeof step !== "number" || typeof steps !== "number") return;
     const progress = steps > 0 ? Math.min(1, step / steps) : 0;
     this.jobs = this.jobs.map((job) => (job.job === event.job ? { ...job, step, steps, progress } : job));
