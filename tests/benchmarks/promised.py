@@ -1,7 +1,8 @@
 """Promised against taken: whole commands `airlens reconstruct`, with nothing compiled and with all of it.
 
     python -m tests.benchmarks.promised --out tests/benchmarks/results/promised.jsonl
-    python -m tests.benchmarks.promised --figures      # app/plan/tradeoff/stages.json, from the rows
+    python -m tests.benchmarks.promised --set figures --out tests/benchmarks/results/stages.jsonl
+    python -m tests.benchmarks.promised --print-figures > app/plan/tradeoff/stages.json     # from the latter
 
 Each case is a simulated experiment and a preset, solved cold (a compilation cache of its own, empty) and then warm.
 The machine's ledger begins empty, so the first cases are promised by the packaged figures, later ones by what was
@@ -31,7 +32,7 @@ from app.volume.scene import Information, RigOptions
 from tests.rooms import ROOM, state_grid
 
 AIRLENS = str(Path(sys.executable).with_name("airlens"))
-RESULTS = Path(__file__).parent / "results" / "promised.jsonl"
+STAGES = Path(__file__).parent / "results" / "stages.jsonl"
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,15 @@ CASES = (
     Case("standard", "surveyed", 160, 14),
     Case("grid", "paper", 768, 16),
     Case("standard", "operator", 160, 12),
+)
+
+
+# What the packaged figures are made from.
+FIGURES = (
+    Case("draft", "surveyed", 160, 24),
+    Case("grid", "surveyed", 160, 8),
+    Case("standard", "surveyed", 160, 10),
+    Case("draft", "surveyed", 1536, 24),
 )
 
 
@@ -99,6 +109,7 @@ def measured(case: Case, scratch: Path) -> Iterable[dict[str, Any]]:
             "pixels": run.pixels,
             "work": run.work,
             "load": round(os.getloadavg()[0], 1),
+            "date": run.at[:10],
         }
 
 
@@ -110,7 +121,12 @@ def _run(experiment: Path, preset: str, environment: dict[str, str]) -> tuple[di
     return json.loads(done.stdout), time.perf_counter() - began_s
 
 
-def figures_of(rows: list[dict[str, Any]], measured_on: str) -> Figures:
+def stage_rows() -> list[dict[str, Any]]:
+    """The committed rows that the packaged figures are made from."""
+    return [json.loads(line) for line in STAGES.read_text(encoding="utf-8").splitlines()]
+
+
+def figures_of(rows: list[dict[str, Any]]) -> Figures:
     """The medians of rows as packaged figures; read and measure as lines through small and large pictures."""
 
     def seconds(stage: str, **of: str) -> float:
@@ -119,7 +135,7 @@ def figures_of(rows: list[dict[str, Any]], measured_on: str) -> Figures:
 
     presets = sorted({row["preset"] for row in rows})
     return Figures(
-        measured=measured_on,
+        measured=max(row["date"] for row in rows),
         start_s=seconds("start"),
         read=_line(rows, "read"),
         measure=_line(rows, "measure"),
@@ -142,15 +158,17 @@ def main() -> None:
     """Print the rows, or the figures that rows make."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=None, help="also append the rows to this file")
-    parser.add_argument("--cases", type=int, default=len(CASES), help="so many of the cases, in their order")
-    parser.add_argument("--figures", action="store_true", help="print the figures that the kept rows make")
+    parser.add_argument(
+        "--set", choices=("promised", "figures"), default="promised", help="which cases to run"
+    )
+    parser.add_argument("--first", type=int, default=0, help="the first case, if some ran before")
+    parser.add_argument("--print-figures", action="store_true", help="print what stages.jsonl makes")
     options = parser.parse_args()
-    if options.figures:
-        rows = [json.loads(line) for line in RESULTS.read_text(encoding="utf-8").splitlines()]
-        print(json.dumps(to_plain(figures_of(rows, time.strftime("%Y-%m-%d"))), indent=1))
+    if options.print_figures:
+        print(json.dumps(to_plain(figures_of(stage_rows())), indent=1))
         return
     with tempfile.TemporaryDirectory() as scratch:
-        for case in CASES[: options.cases]:
+        for case in {"promised": CASES, "figures": FIGURES}[options.set][options.first :]:
             for row in measured(case, Path(scratch)):
                 line = json.dumps(row)
                 print(line, flush=True)
