@@ -4,7 +4,7 @@
 
 Work is a count of the dominant loop: windows and vertices of the normal equations (draft), cell-steps of
 every march (standard, reference), cells (grid), iterations (paper). `airlens bench calibrate` measures both lines of
-each preset on a machine.
+each preset on a machine, compiling left out.
 """
 
 import numpy as np

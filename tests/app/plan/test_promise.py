@@ -7,6 +7,7 @@ from app.plan import promise as module
 from app.plan.promise import Figures, Line, Task, figure_s, in_words, promise, renewed, source
 from app.plan.runs import Run, keep_run
 from core.plan.speed import Speed
+from tests.benchmarks.promised import figures_of, stage_rows
 
 FIGURES = Figures(
     measured="2026-01-02",
@@ -123,6 +124,11 @@ def test_programs_that_are_gone_or_elsewhere_are_compiled_again(figures, monkeyp
     assert not promise(DRAFT, runs, SPEEDS).warm
     monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path / "nowhere"))
     assert not promise(DRAFT, runs, SPEEDS).warm
+
+
+def test_the_packaged_figures_are_the_committed_rows():
+    packaged = Figures.model_validate_json(module.FIGURES.read_text(encoding="utf-8"))
+    assert packaged == figures_of(stage_rows())
 
 
 def test_every_preset_has_figures():
