@@ -104,7 +104,10 @@ class _Left(ProgressColumn):
     def render(self, task: Task) -> Text:
         """Nothing while it is not known."""
         ends_s = task.fields.get("ends_s")
-        return Text("" if ends_s is None else f"about {max(0, ends_s - time.monotonic()):.0f} s left")
+        if ends_s is None:
+            return Text("")
+        left_s = ends_s - time.monotonic()
+        return Text(f"about {left_s:.0f} s left" if left_s > 0 else "longer than usual")
 
 
 @contextlib.contextmanager

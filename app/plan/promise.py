@@ -135,7 +135,7 @@ def stage_s(
 
 
 def figure_s(stage: str, task: Task | Run, warm: bool, speeds: Mapping[str, Speed]) -> float | None:
-    """What the figures say of one stage [s]; None for a solver whose work or speed is not known."""
+    """What the figures say of one stage [s]; None for work that is not counted and for a preset without figures."""
     figures, preset = stage_figures(), _LIKE.get(task.preset, task.preset)
     if stage == "solve":
         speed = speeds.get(task.preset)
@@ -145,7 +145,9 @@ def figure_s(stage: str, task: Task | Run, warm: bool, speeds: Mapping[str, Spee
         return line.fixed_s + line.s_per_pixel * task.pixels
     if stage == "start":
         return figures.start_s
-    return {"compile": figures.warm_s if warm else figures.cold_s, "report": figures.report_s}[stage][preset]
+    return {"compile": figures.warm_s if warm else figures.cold_s, "report": figures.report_s}[stage].get(
+        preset
+    )
 
 
 @functools.cache

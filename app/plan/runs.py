@@ -7,6 +7,7 @@ Where the folder cannot be written there are no runs, and nothing is said of it:
 import contextlib
 import os
 from pathlib import Path
+from typing import Annotated
 
 from pydantic import Field, ValidationError
 
@@ -19,6 +20,7 @@ from app.plan.machine import machine_path
 # Newest runs that are kept. The file grows to twice as many before it is cut: it is seldom rewritten.
 KEPT = 300
 _WAIT_S = 2.0
+_Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class Run(Strict):
@@ -34,9 +36,9 @@ class Run(Strict):
     scene: str
     folder: str
     warm: bool | None
-    pixels: float = Field(ge=0)
-    work: float | None = Field(ge=0)
-    seconds: dict[str, float]
+    pixels: _Amount
+    work: _Amount | None
+    seconds: dict[str, _Amount]
 
 
 def runs_path() -> Path:

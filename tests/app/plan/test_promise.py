@@ -93,6 +93,12 @@ def test_another_presets_runs_tell_how_fast_the_machine_is(figures):
     assert found.runs == 0
 
 
+def test_a_preset_of_another_version_tells_nothing_and_does_no_harm(figures):
+    gone = Task("gone", programs="g", scene="s", pixels=1e6, work=1.0)
+    assert promise(DRAFT, (ran(figures, gone, solve=9.0, compile=9.0, report=9.0),), SPEEDS).wall_s == COLD_S
+    assert promise(gone, (), SPEEDS).wall_s is None
+
+
 def test_work_that_nobody_counted_is_promised_only_where_it_was_done_before(figures):
     unknown = Task("standard", programs="r", scene="s", pixels=1e6, work=None)
     assert promise(unknown, (), SPEEDS).wall_s is None

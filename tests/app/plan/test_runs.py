@@ -27,8 +27,11 @@ def test_lines_that_are_no_runs_are_passed_over(tmp_path):
     path = tmp_path / "runs.jsonl"
     keep_run(run(1), path)
     other = json.dumps({**json.loads(run().model_dump_json()), "pixels": "many"})
+    endless = run().model_dump_json().replace("1.5", "Infinity")
+    assert "Infinity" in endless
     with path.open("ab") as file:
-        file.write(b'\n[1, 2]\n{"at": 3}\n\xff\xfe\n' + other.encode() + b'\n{"at": "cut of')
+        file.write(b'\n[1, 2]\n{"at": 3}\n\xff\xfe\n' + other.encode() + b"\n" + endless.encode())
+        file.write(b'\n{"at": "cut of')
     keep_run(run(2), path)
     assert kept_runs(path) == (run(1), run(2))
 

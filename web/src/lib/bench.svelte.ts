@@ -55,8 +55,8 @@ class Bench {
   preset = $state("auto");
   /** What each running job says that it does. */
   stages = $state.raw<Record<string, string>>({});
-  /** When a job will end, as it told last: seconds since 1970. */
-  ends = $state.raw<Record<string, number>>({});
+  /** When a job will end, as it told last: seconds since 1970; null where it does not know. */
+  ends = $state.raw<Record<string, number | null>>({});
   done = $state("");
   /** Grows with everything that is told of a guided calibration. */
   guided = $state(0);
@@ -378,7 +378,8 @@ class Bench {
   private progress(event: EventResource): void {
     const { step, steps, stage, left_s } = event.body;
     if (event.job && typeof stage === "string") this.stages = { ...this.stages, [event.job]: stage };
-    if (event.job && typeof left_s === "number") this.ends = { ...this.ends, [event.job]: event.at_s + left_s };
+    if (event.job && (stage !== undefined || step !== undefined))
+      this.ends = { ...this.ends, [event.job]: typeof left_s === "number" ? event.at_s + left_s : null };
     if (typeof step !== "number" || typeof steps !== "number") return;
     const progress = steps > 0 ? Math.min(1, step / steps) : 0;
     this.jobs = this.jobs.map((job) => (job.job === event.job ? { ...job, step, steps, progress } : job));
