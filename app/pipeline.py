@@ -17,6 +17,8 @@ from app.experiment.shift_files import write_shifts
 from app.files.durable import write_text
 from app.files.provenance import provenance
 from app.files.toml import to_plain
+from app.plan.task import task_in
+from app.plan.under_way import UnderWay
 from app.reconstruct.agreement import rendered_agreement
 from app.reconstruct.measure import Measurement, measure
 from app.reconstruct.presets import AUTO, check_data_term, resolved, solved
@@ -34,7 +36,8 @@ from core.watch import Watch
 class Reconstruction:
     """A finished reconstruction: its folder, what was solved, and the air.
 
-    `no_report` says why there is no report, where there is none.
+    `no_report` says why there is no report, where there is none. `promised_s` is what was promised, None where
+    nothing was: all of it, the process' start too where that is known.
     """
 
     folder: Path
@@ -43,6 +46,7 @@ class Reconstruction:
     measurement: Measurement
     wall_s: float
     no_report: str = ""
+    promised_s: float | None = None
 
     @property
     def solution(self) -> Solution:
@@ -57,6 +61,7 @@ def reconstruct(
     sequence: bool = False,
     watch: Watch = Watch(),
     into: Path | None = None,
+    start_s: float | None = None,
 ) -> Reconstruction:
     """Reconstruct the newest captures of an experiment. Raises BadInputError, SettingError, StoppedError.
 
@@ -64,35 +69,42 @@ def reconstruct(
 
     The result goes to a new folder among the experiment's results, or to `into`, which exists. A solver keeps in
     `watch.store` what it can go on from; one that finds there another problem's, or other settings', starts afresh.
+    Rows that are told say `left_s`, the seconds yet, where the machine's runs, a plan or the scene tell them; the
+    one before the captures are read says so in words (`promised`). `start_s` is what the process took until now,
+    where it serves this run alone. Promises are learned from every run that did not go on from an earlier one.
     """
-    started = time.perf_counter()
+    started, under_way = time.perf_counter(), UnderWay(start_s)
+    watch = under_way.watched(watch)
 
-    def on_stage(stage: str) -> None:
+    def on_stage(doing: str, stage: str, **more: str) -> None:
+        under_way.enter(stage)
         watch.check_stop()
-        watch.tell({"doing": stage})
+        watch.tell({"doing": doing, **more})
 
     experiment = open_experiment(folder)
-    on_stage("read what is known")
+    on_stage("read what is known", "read")
     known = known_of(experiment)
     preset = resolved(preset, known.scene)
     solve = preset_called(preset)
     check_data_term(preset, known.scene)
-    on_stage("read the captures")
+    # A sequence takes longer than the preset alone, of which the promise is.
+    under_way.begin(task_in(experiment, known, preset), afresh=not watch.store and not sequence)
+    on_stage("read the captures", "read", promised=under_way.said)
     captures = newest_pair(experiment)
     if sequence:
         check_sequence(captures)
-    on_stage("measure the shift of the pattern")
+    on_stage("measure the shift of the pattern", "measure")
     measurement = measure(captures, known.scene)
     # With what was found to stand in the room.
     standing = replace(known, scene=measurement.scene)
     problem = problem_of(standing, measurement.shifts, measurement.images)
-    on_stage("check the rendered reference against the captured one")
+    on_stage("check the rendered reference against the captured one", "measure")
     checked = rendered_agreement(known.scene, captures.reference)
-    on_stage(f"solve ({preset})")
+    on_stage(f"solve ({preset})", "solve")
     solution = solved(solve, problem, watch)
     if sequence:
         solution = with_departures(solution, measurement, watch)
-    on_stage("keep the result")
+    on_stage("keep the result", "report")
     stands = [one.sentence for one in measurement.found]
     told = [known.optics, *aged(experiment, captures), *measurement.notes, *stands, checked, *solution.notes]
     result = into or _new_folder(experiment, preset)
@@ -101,10 +113,12 @@ def reconstruct(
         experiment, result.name, manifest, solution, lambda: measurement.shifts, lambda: captures
     )
     _keep(result, finding, measurement)
-    on_stage("report")
+    on_stage("report", "report")
     no_report = _reported(finding, result)
+    under_way.keep()
+    wall_s = time.perf_counter() - started
     return Reconstruction(
-        result, finding, problem, measurement, time.perf_counter() - started, no_report=no_report
+        result, finding, problem, measurement, wall_s, no_report=no_report, promised_s=under_way.promised_s
     )
 
 

@@ -17,11 +17,19 @@ import psutil
 import pytest
 
 _FOLDER = "JAX_COMPILATION_CACHE_DIR"
+_MACHINE = "AIRLENS_MACHINE"
 
 
 def pytest_configure(config) -> None:
     # Set where the run begins: workers and the processes that tests start inherit it.
-    if hasattr(config, "workerinput") or os.environ.get(_FOLDER):
+    if hasattr(config, "workerinput"):
+        return
+    if not os.environ.get(_MACHINE):
+        # Runs of tests say nothing of this machine's speed to whoever uses it.
+        runs = tempfile.mkdtemp(prefix="airlens-machine-")
+        config.add_cleanup(lambda: shutil.rmtree(runs, ignore_errors=True))
+        os.environ[_MACHINE] = str(Path(runs) / "machine.json")
+    if os.environ.get(_FOLDER):
         return
     folder = tempfile.mkdtemp(prefix="airlens-compiled-")
     config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))

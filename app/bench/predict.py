@@ -13,8 +13,7 @@ import numpy as np
 import typer
 
 from app.bench.parts.isolated import alone
-from app.plan.machine import this_machine
-from app.plan.make import preset_lines, signals_of, windows_of
+from app.plan.make import preset_lines, signals_of
 from app.reconstruct.presets import PRESETS
 from app.volume.file import read_volume
 from app.volume.measurement import known_planes, synthetic_problem
@@ -56,9 +55,7 @@ def compared(
     problem = Problem(scene, (), known_planes(volume, scene))
     flow = expected_flow(problem)
     signals = signals_of(problem, flow)
-    machine, _ = this_machine()
-    lines = preset_lines(problem, flow, machine.speeds, [windows_of(s) for s in signals])
-    for line in (line for line in lines if line.preset in presets and line.fits):
+    for line in (line for line in preset_lines(problem, flow) if line.preset in presets and line.fits):
         found, _ = alone(solved, path, options, information, line.preset)
         yield {
             "room": path.stem, "information": information, "light": options.light, "preset": line.preset,

@@ -55,13 +55,15 @@ def show(made: "Plan") -> None:
 
 
 def _presets(made: "Plan") -> Table:
+    from app.plan.promise import in_words
+
     table = Table(
-        "preset", "solver", "memory", "T error", "u error", "p error", "", title="what each preset would cost"
+        "preset", "time", "memory", "T error", "u error", "p error", "", title="what each preset would cost"
     )
     for line in made.presets:
         table.add_row(
             line.preset,
-            _seconds(line.solver_s),
+            "-" if line.wall_s is None else in_words(line.wall_s),
             "-" if line.memory_mb is None else f"{line.memory_mb:.0f} MB",
             "-" if line.temperature_error_k is None else f"{line.temperature_error_k:.2g} K",
             "-" if line.velocity_error is None else f"{100 * line.velocity_error:.0f} %",
@@ -84,15 +86,3 @@ def _choices(made: "Plan") -> Table:
             line.reason,
         )
     return table
-
-
-def _seconds(value: float | None) -> str:
-    if value is None:
-        return "-"
-    return (
-        f"{value:.0f} s"
-        if value < 120
-        else f"{value / 60:.0f} min"
-        if value < 7200
-        else f"{value / 3600:.0f} h"
-    )

@@ -5,6 +5,7 @@ import json
 import shutil
 import signal
 import threading
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated
@@ -13,11 +14,14 @@ import typer
 from rich.progress import (
     BarColumn,
     Progress,
+    ProgressColumn,
     SpinnerColumn,
+    Task,
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
 )
+from rich.text import Text
 
 # Known here by name, so that a shell completes them without what they solve with.
 PRESETS = ("auto", "draft", "standard", "reference", "grid", "paper")
@@ -47,6 +51,7 @@ def reconstruct(
     from app.experiment.folder import open_experiment
     from app.jobs.checkpoints import FolderStore
     from app.pipeline import reconstruct as run
+    from app.plan.under_way import process_age_s
     from core.watch import StoppedError, Watch
 
     kept = open_experiment(experiment).checkpoint_folder
@@ -55,7 +60,8 @@ def reconstruct(
         typer.echo(f"Going on from {kept}, where captures and settings are the same.", err=True)
     try:
         with _progress(quiet=as_json) as told, _interruptible() as stop:
-            done = run(experiment, preset, sequence=sequence, watch=Watch(told, stop.is_set, store))
+            watch = Watch(told, stop.is_set, store)
+            done = run(experiment, preset, sequence=sequence, watch=watch, start_s=process_age_s())
     except StoppedError:
         typer.echo(f"Stopped. What was done is kept in {kept}; the same command goes on from it.", err=True)
         raise typer.Exit(130) from None
@@ -68,6 +74,7 @@ def reconstruct(
         "solver_s": done.solution.solver_s,
         "wall_s": done.wall_s,
         "found": [one.sentence for one in done.measurement.found],
+        "promised_s": done.promised_s,
     }
     if as_json:
         typer.echo(json.dumps(summary, indent=1))
@@ -85,18 +92,34 @@ class _Shown:
         self._bar, self._task = bar, bar.add_task("start", total=None)
 
     def __call__(self, row: Mapping[str, float | str], growing: object) -> None:
-        share = row.get("share")
+        share, left_s = row.get("share"), row.get("left_s")
         if isinstance(share, float):
             self._bar.update(self._task, total=1.0, completed=share)
+        if isinstance(left_s, float):
+            self._bar.update(self._task, ends_s=time.monotonic() + left_s)
+        if row.get("promised"):
+            typer.echo(row["promised"], err=True)
         self._bar.update(self._task, description=str(row["doing"]))
         if str(row["doing"]).startswith("start afresh"):
             self._bar.console.print(f"{row['doing']}.")
 
 
+class _Left(ProgressColumn):
+    """How long yet, counted down from what was told last."""
+
+    def render(self, task: Task) -> Text:
+        """Nothing while it is not known."""
+        ends_s = task.fields.get("ends_s")
+        if ends_s is None:
+            return Text("")
+        left_s = ends_s - time.monotonic()
+        return Text(f"about {left_s:.0f} s left" if left_s > 0 else "longer than usual")
+
+
 @contextlib.contextmanager
 def _progress(*, quiet: bool) -> Iterator[_Shown]:
     words = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-    with Progress(*words, TimeElapsedColumn(), transient=True, disable=quiet) as bar:
+    with Progress(*words, TimeElapsedColumn(), _Left(), transient=True, disable=quiet) as bar:
         yield _Shown(bar)
 
 

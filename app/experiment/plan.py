@@ -80,11 +80,19 @@ class SeenLine(Strict):
 
 
 class PresetLine(Strict):
-    """What a preset would cost and find; null where nothing predicts it. `fits` is false where it would refuse."""
+    """What a preset would cost and find; null where nothing predicts it. `fits` is false where it would refuse.
+
+    `wall_s` is the whole run, `solver_s` of it compiling and solving; `compiled` tells whether its programs lie
+    compiled. Times are told anew where a plan is shown, from `work`, in the solver's loops, and `programs`.
+    """
 
     preset: str
     fits: bool
+    wall_s: float | None = None
     solver_s: float | None
+    compiled: bool = False
+    work: float | None = None
+    programs: str = ""
     memory_mb: float | None
     temperature_error_k: float | None
     velocity_error: float | None
@@ -93,9 +101,14 @@ class PresetLine(Strict):
 
 
 class Plan(Strict):
-    """Everything that can be said beforehand."""
+    """Everything that can be said beforehand.
+
+    `scene` is a hash of what was stated of the room then, `pixels` are those of all views.
+    """
 
     schema_version: int = 1
+    scene: str = ""
+    pixels: float = 0.0
     expected: str
     expected_contrast_k: float
     expected_departure_k: float

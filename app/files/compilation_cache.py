@@ -21,7 +21,7 @@ def use_compilation_cache() -> Path | None:
     """Turn the cache on, unless JAX_COMPILATION_CACHE_DIR says where; None where no folder can be made."""
     if os.environ.get("JAX_COMPILATION_CACHE_DIR"):
         return None
-    folder = cache_folder() / f"compiled-{_processor()}"
+    folder = _own_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         prune(folder, LARGEST_BYTES)
@@ -36,6 +36,17 @@ def use_compilation_cache() -> Path | None:
         if "jax" in sys.modules:
             sys.modules["jax"].config.update(name, value)
     return folder
+
+
+def compiled_folder() -> Path | None:
+    """Where programs are kept, by JAX_COMPILATION_CACHE_DIR or by this module; None where nothing is."""
+    named = os.environ.get("JAX_COMPILATION_CACHE_DIR")
+    folder = Path(named) if named else _own_folder()
+    return folder if folder.is_dir() else None
+
+
+def _own_folder() -> Path:
+    return cache_folder() / f"compiled-{_processor()}"
 
 
 def prune(folder: Path, largest_bytes: int) -> None:

@@ -1,4 +1,4 @@
-"""How fast this machine is: two numbers a preset, measured once by `airlens bench calibrate`.
+"""How fast this machine solves: two numbers a preset, measured once by `airlens bench calibrate`.
 
 Kept in the user's cache folder, or where AIRLENS_MACHINE says. Without a
 measurement the packaged figures of the machine that the README's were taken on serve, and the plan says so.
@@ -12,7 +12,7 @@ from app.errors import BadInputError
 from app.files.durable import write_json
 from app.files.toml import Strict, parse, to_plain
 from app.files.user_folders import cache_folder
-from core.plan.cost import Speed
+from core.plan.speed import Speed
 
 REFERENCE = Path(__file__).resolve().parent / "tradeoff" / "machine.json"
 

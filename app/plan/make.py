@@ -20,14 +20,16 @@ from app.files.durable import write_json
 from app.files.toml import to_plain
 from app.plan.acting import acting_choices
 from app.plan.machine import this_machine
+from app.plan.promise import promise, source
+from app.plan.runs import kept_runs
+from app.plan.task import pixels_of, scene_of, task_of, work_of
 from app.plan.tradeoff import ExpectedError, expected_error
-from app.reconstruct.presets import REFERENCE, STANDARD
+from app.reconstruct.presets import PRESETS
 from app.reconstruct.problem import known_of
 from core.displacement import resolve_window_px
 from core.known import level_of
 from core.metrics import departure, inner, rms
 from core.plan.choice import Choice
-from core.plan.cost import Speed, Work, draft_work, grid_work, paper_work, room_work
 from core.plan.expected import ExpectedFlow, expected_flow
 from core.plan.observability import seen
 from core.plan.places import place_map
@@ -57,8 +59,9 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
     on_stage("judge the choices")
     choices = acting_choices(problem.scene, flow, signals)
     views = [_view_line(problem, n, flow, s, places[n]) for n, s in enumerate(signals)]
-    machine, source = this_machine()
     made = Plan(
+        scene=scene_of(problem.scene),
+        pixels=pixels_of(problem.scene),
         expected=flow.source,
         expected_contrast_k=float(np.abs(flow.excess_k).max()),
         expected_departure_k=departure_k(flow),
@@ -71,8 +74,8 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
             both=determined.both,
         ),
         choices=[_choice_line(choice) for choice in choices],
-        presets=preset_lines(problem, flow, machine.speeds, windows=[windows_of(s) for s in signals]),
-        machine=source,
+        presets=preset_lines(problem, flow),
+        machine=source(),
         verdicts=[
             *(
                 verdict(problem.scene, n, flow, s, view.other_light_shift_p99_px)
@@ -97,38 +100,32 @@ def departure_k(flow: ExpectedFlow) -> float:
     return rms(departure(inner(flow.excess_k)))
 
 
-def preset_lines(
-    problem: Problem, flow: ExpectedFlow, speeds: dict[str, Speed], windows: list[int]
-) -> list[PresetLine]:
-    """Every preset: time and memory from this machine's speed, error from the reference rooms."""
-    works: dict[str, Work | None] = {
-        "draft": draft_work(problem, sum(windows)),
-        "standard": room_work(problem, flow, STANDARD),
-        "reference": room_work(problem, flow, REFERENCE),
-        "grid": grid_work(problem),
-        "paper": paper_work(),
-    }
-    level, light = level_of(problem), problem.scene.light.kind
-    lines = []
-    for name, work in works.items():
-        speed = speeds.get(name)
-        needs_walls = name in ("standard", "reference")
-        fits = flow.step_s is not None or not needs_walls
-        known = expected_error(name, level, light) if fits else None
-        timed = (work, speed) if work is not None and speed is not None and fits else None
-        lines.append(
-            PresetLine(
-                preset=name,
-                fits=fits,
-                solver_s=timed[1].seconds(timed[0]) if timed else None,
-                memory_mb=timed[1].megabytes(timed[0]) if timed else None,
-                temperature_error_k=known.temperature * departure_k(flow) if known else None,
-                velocity_error=known.velocity if known else None,
-                pressure_error=known.pressure if known else None,
-                reason=_preset_reason(fits, known),
-            )
-        )
-    return lines
+def preset_lines(problem: Problem, flow: ExpectedFlow) -> list[PresetLine]:
+    """Every preset: time and memory by this machine's figures and runs, error from the reference rooms."""
+    return [_preset_line(name, problem, flow) for name in PRESETS]
+
+
+def _preset_line(name: str, problem: Problem, flow: ExpectedFlow) -> PresetLine:
+    speeds = this_machine()[0].speeds
+    fits = flow.step_s is not None or name not in ("standard", "reference")
+    known = expected_error(name, level_of(problem), problem.scene.light.kind) if fits else None
+    work = work_of(name, problem, flow)
+    task = task_of(name, problem, None if work is None else work.loops)
+    promised = promise(task, kept_runs(), speeds)
+    return PresetLine(
+        preset=name,
+        fits=fits,
+        wall_s=promised.wall_s if fits else None,
+        solver_s=promised.solver_s if fits else None,
+        compiled=promised.warm,
+        work=task.work,
+        programs=task.programs,
+        memory_mb=speeds[name].megabytes(work) if work is not None and name in speeds else None,
+        temperature_error_k=known.temperature * departure_k(flow) if known else None,
+        velocity_error=known.velocity if known else None,
+        pressure_error=known.pressure if known else None,
+        reason=_preset_reason(fits, known),
+    )
 
 
 def _preset_reason(fits: bool, known: ExpectedError | None) -> str:
@@ -146,11 +143,6 @@ def signals_of(problem: Problem, flow: ExpectedFlow) -> tuple[Signal, ...]:
         signal(scene, n, flow, shift_noise(scene, n, resolve_window_px(scene, view)))
         for n, view in enumerate(scene.views)
     )
-
-
-def windows_of(found: Signal) -> int:
-    """How many windows a view will measure."""
-    return len(found.shift.centres_px) * found.shift.stride**2
 
 
 def _view_line(

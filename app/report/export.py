@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Literal
 
 from app.errors import BadInputError
-from app.experiment.folder import open_experiment
+from app.experiment.folder import open_experiment, read_manifest
+from app.experiment.found import found_in
 from app.experiment.results import read_derived, read_result, to_dataset
 from app.files.durable import write_durably
 from app.report.figures import as_png, slices_figure
@@ -49,10 +50,11 @@ def export(
         write_durably(path, lambda temporary: shutil.copyfile(source, temporary))
     else:
         scene = experiment.settings.scene
+        standing = [one.box for one in found_in(read_manifest(source.parent)) if one.solved]
         writers: dict[str, Callable[[Path, Solution], object]] = {
             "vti": partial(write_vti, derived=read_derived(source)),
             "csv": partial(_write_csv, derived=read_derived(source)),
-            "zip": partial(write_openfoam, objects=scene.objects, air=scene.air),
+            "zip": partial(write_openfoam, objects=(*scene.objects, *standing), air=scene.air),
             "png": _write_png,
             "vtu": write_vtu,
             "pvd": write_series,

@@ -4,20 +4,21 @@
 
 Work is a count of the dominant loop: windows and vertices of the normal equations (draft), cell-steps of
 every march (standard, reference), cells (grid), iterations (paper). `airlens bench calibrate` measures both lines of
-each preset on a machine.
+each preset on a machine, compiling left out.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 
+from core.displacement import resolve_window_px, window_centres
 from core.estimate.forward_runs import RoomSettings
 from core.estimate.prior import room_prior
 from core.estimate.schedule import fit_work
 from core.plan.expected import ExpectedFlow
+from core.plan.speed import Work
 from core.problem import Problem
+from core.rays.visibility import sees_wall
 from core.room.forward import closure_name, room
-from core.setting import setting
+from core.scene import Scene
 from core.solve.draft.draft import draft_grid
 from core.solve.recipes import PAPER_STEPS
 
@@ -25,30 +26,16 @@ from core.solve.recipes import PAPER_STEPS
 _FREE_PROFILE = 1.5
 
 
-@dataclass(frozen=True)
-class Work:
-    """The work of a preset and the size of its arrays, in units of its own loop."""
-
-    loops: float
-    size: float
+def windows_seen(scene: Scene) -> int:
+    """How many windows of all views see the wall, whole: as many as are measured."""
+    return sum(_windows_of(scene, index) for index in range(len(scene.views)))
 
 
-@setting
-class Speed:
-    """One preset on one machine: seconds and megabytes as straight lines in its work and its size."""
-
-    fixed_s: float
-    s_per_work: float
-    fixed_mb: float
-    mb_per_size: float
-
-    def seconds(self, work: Work) -> float:
-        """Solver time."""
-        return self.fixed_s + self.s_per_work * work.loops
-
-    def megabytes(self, work: Work) -> float:
-        """Peak memory."""
-        return self.fixed_mb + self.mb_per_size * work.size
+def _windows_of(scene: Scene, index: int) -> int:
+    view = scene.views[index]
+    window_px = resolve_window_px(scene, view)
+    centres = window_centres((view.camera.height_px, view.camera.width_px), window_px)
+    return int(sees_wall(scene, index, centres, margin_px=float(window_px)).sum())
 
 
 def draft_work(problem: Problem, windows: int) -> Work:

@@ -7,14 +7,15 @@ from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
 from app.experiment.plan import Plan
 from app.experiment.plan import read_plan as kept_plan
+from app.plan.promise import renewed
 
 router = APIRouter(tags=["plans"])
 
 
 @router.get("/experiments/{experiment}/plan")
 def read_plan(given: Given, experiment: Identifier) -> Plan:
-    """Return the newest plan; a job of kind `plan` makes it."""
+    """Return the newest plan, its times as this machine's runs tell them now; a job of kind `plan` makes it."""
     found = kept_plan(given.folders.open(experiment))
     if found is None:
         raise ApiError("not_found", "This experiment has no plan yet.", "Submit a job of kind plan.")
-    return found
+    return renewed(found)

@@ -10,6 +10,8 @@ from app.jobs import Ledger
 
 KEPT = 16
 PAGE = 20_000
+# Of a moment: where the job is, and how long yet.
+_NO_CURVES = {"step", "steps", "left_s"}
 
 
 class CurveCache:
@@ -52,7 +54,7 @@ class _Told:
         steps = every[::stride]
         if every and steps[-1] != every[-1]:
             steps.append(every[-1])
-        names = sorted({name for step in steps for name in self._rows[step]} - {"step", "steps"})
+        names = sorted({name for step in steps for name in self._rows[step]} - _NO_CURVES)
         return steps, {name: [_number(self._rows[step].get(name)) for step in steps] for name in names}
 
 

@@ -49,6 +49,7 @@ def run(attempt: Attempt, settings: ReconstructSettings) -> dict[str, Any]:
     # Imported here: reading a job's settings must not cost the start of the array library.
     from app.experiment.folder import open_experiment
     from app.pipeline import reconstruct
+    from app.plan.under_way import process_age_s
     from core.watch import StoppedError, Watch
 
     experiment = attempt.experiment_folder()
@@ -57,7 +58,12 @@ def run(attempt: Attempt, settings: ReconstructSettings) -> dict[str, Any]:
     watch = Watch(told, attempt.stop.is_set, FolderStore(attempt.checkpoints))
     try:
         done = reconstruct(
-            experiment, settings.preset, sequence=settings.sequence, watch=watch, into=attempt.output
+            experiment,
+            settings.preset,
+            sequence=settings.sequence,
+            watch=watch,
+            into=attempt.output,
+            start_s=process_age_s(),
         )
     except StoppedError as error:
         raise AttemptStoppedError from error
@@ -67,7 +73,7 @@ def run(attempt: Attempt, settings: ReconstructSettings) -> dict[str, Any]:
 
 
 class _Teller:
-    """Turns a solver's rows into the attempt's events: what is being done, how much is done, how the field grows."""
+    """Turns a run's rows into events: what is being done, how much is done, how long yet, how the field grows."""
 
     def __init__(self, attempt: Attempt, ambient_k: float) -> None:
         self._attempt, self._ambient_k = attempt, ambient_k
@@ -75,15 +81,17 @@ class _Teller:
 
     def __call__(self, row: Mapping[str, float | str], growing: "Callable[[], Solution] | None") -> None:
         doing = str(row["doing"])
+        numbers = {name: float(value) for name, value in row.items() if not isinstance(value, str)}
+        left_s = numbers.pop("left_s", None)
+        left = {} if left_s is None else {"left_s": left_s}
         if doing != self._doing:
             self._doing = doing
-            self._attempt.tell("stage", {"stage": doing})
-        numbers = {name: float(value) for name, value in row.items() if not isinstance(value, str)}
+            self._attempt.tell("stage", {"stage": doing, **left})
         if numbers:
             counted = next(self._count)
             share = numbers.pop("share", None)
             step, steps = (counted, 0) if share is None else (round(_PARTS * share), _PARTS)
-            self._attempt.progress(step, steps, numbers)
+            self._attempt.progress(step, steps, numbers | left)
         if growing is not None and time.monotonic() - self._shown_s >= SHOWN_EVERY_S:
             self.show(growing())
             self._shown_s = time.monotonic()

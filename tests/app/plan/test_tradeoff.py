@@ -16,7 +16,7 @@ from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.file import read_volume
 from app.volume.measurement import fine_field
 from app.volume.scene import RigOptions, room_scene
-from core.plan.cost import Speed, Work
+from core.plan.speed import Speed, Work
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -59,6 +59,8 @@ class Bench {
   everyBurst = $state(true);
   /** What each running job says that it does. */
   stages = $state.raw<Record<string, string>>({});
+  /** When a job will end, as it told last: seconds since 1970; null where it does not know. */
+  ends = $state.raw<Record<string, number | null>>({});
   done = $state("");
   /** Grows with everything that is told of a guided calibration. */
   guided = $state(0);
@@ -399,8 +401,10 @@ class Bench {
   }
 
   private progress(event: EventResource): void {
-    const { step, steps, stage } = event.body;
+    const { step, steps, stage, left_s } = event.body;
     if (event.job && typeof stage === "string") this.stages = { ...this.stages, [event.job]: stage };
+    if (event.job && (stage !== undefined || step !== undefined))
+      this.ends = { ...this.ends, [event.job]: typeof left_s === "number" ? event.at_s + left_s : null };
     if (typeof step !== "number" || typeof steps !== "number") return;
     const progress = steps > 0 ? Math.min(1, step / steps) : 0;
     this.jobs = this.jobs.map((job) => (job.job === event.job ? { ...job, step, steps, progress } : job));

@@ -1,5 +1,5 @@
 // Names of fields, curves, results and times as people say them.
-import type { FieldResource, ResultLine } from "./schema";
+import type { FieldResource, PresetLine, ResultLine } from "./schema";
 
 const CURVES: Record<string, string> = {
   loss: "misfit",
@@ -138,4 +138,10 @@ export function short(value: number, celsius = false): string {
 export function duration(seconds: number): string {
   if (seconds < 90) return `${Math.max(1, Math.round(seconds))} s`;
   return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${(seconds / 3600).toFixed(1)} h`;
+}
+
+/** The whole time that a preset is promised to take, and that it compiles where it does; empty where not known. */
+export function expectedTime(one: PresetLine): string {
+  if (one.wall_s === null || one.wall_s === undefined) return "";
+  return `${duration(one.wall_s)}${one.compiled ? "" : " with compiling"}`;
 }

@@ -27,6 +27,12 @@ def test_curves_are_thinned_with_their_first_and_last_point(ledger: Ledger):
     assert values == {"loss": [1.0 / (step + 1) for step in steps]}
 
 
+def test_how_long_yet_is_of_a_moment_and_no_curve(ledger: Ledger):
+    job = ledger.submit(JobSpec(kind="noise-study")).id
+    ledger.append_event("progress", {"step": 1, "steps": 50, "loss": 1.0, "left_s": 9.0}, job=job)
+    assert set(CurveCache(ledger).read(job, 10)[1]) == {"loss"}
+
+
 def test_what_is_told_later_is_added(ledger: Ledger):
     job = ledger.submit(JobSpec(kind="noise-study")).id
     cache = CurveCache(ledger)
