@@ -26,10 +26,11 @@ class VertexGrid:
     shape: tuple[int, int, int]
 
     @property
-    def axes_m(self) -> tuple[Float[np.ndarray, " n"], ...]:
+    def axes_m(self) -> tuple[Float[np.ndarray, " nx"], Float[np.ndarray, " ny"], Float[np.ndarray, " nz"]]:
         """Coordinates along x, y, z."""
         ends = zip(self.box.lower_m, self.box.upper_m, self.shape, strict=True)
-        return tuple(np.linspace(low, high, n) for low, high, n in ends)
+        x_m, y_m, z_m = (np.linspace(low, high, n) for low, high, n in ends)
+        return x_m, y_m, z_m
 
     @property
     def spacing_m(self) -> tuple[float, ...]:

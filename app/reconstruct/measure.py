@@ -95,7 +95,7 @@ def _measure_view(
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     exposures = _exposures(scene, index, captures.reference, captures.flow)
     check_pair(captures.reference, captures.flow, index, exposures.variance)
-    in_room, beyond = _wall_and_beyond(scene, index, exposures)
+    in_room, beyond = _wall_and_beyond(scene, index, exposures.before.shape, exposures.window_px)
     prior, said = mount(view.drift_std_px), ""
     if captures.after is not None:
         found = between_references(captures, scene, index)
@@ -104,16 +104,16 @@ def _measure_view(
     return _in_room(shift, in_room, covered, drift, said + note)
 
 
-def _wall_and_beyond(scene: Scene, index: int, exposures: Exposures) -> tuple[Mask, Mask]:
-    """The windows on the back wall, and those beyond it that may be still."""
-    window_px, centres = exposures.window_px, window_centres(exposures.before.shape, exposures.window_px)
+def _wall_and_beyond(scene: Scene, index: int, shape: tuple[int, int], window_px: int) -> tuple[Mask, Mask]:
+    """The windows on the back wall, and those beyond it that may be still, in a picture of `shape`."""
+    centres = window_centres(shape, window_px)
     in_room = sees_wall(scene, index, centres, margin_px=float(window_px))
     # The wall's own edge, seen through the room's air, must not reach into a window that counts as still, nor into
     # the filter of its gradient.
     reach_px = 0.5 * window_px + len(derivative_filter()) // 2
     beyond = ~sees_wall(scene, index, centres, margin_px=-reach_px)
     beyond &= ~hidden_by_objects(scene, index, centres, margin_px=float(window_px))
-    return in_room, beyond & _whole(centres, exposures.before.shape)
+    return in_room, beyond & _whole(centres, shape)
 
 
 def _burst_shifts(
@@ -124,14 +124,13 @@ def _burst_shifts(
     Their information is that of the burst's own noise.
     """
     mean, view = captures.flow.images[index].mean, scene.views[index]
+    in_room, beyond = _wall_and_beyond(scene, index, mean.shape, shift.window_px)
+    chosen = _among(window_centres(mean.shape, shift.window_px), shift.centres_px)
     found = []
-    for number, folder in enumerate(burst.folder for burst in captures.bursts):
+    for folder in (burst.folder for burst in captures.bursts):
         burst = load_capture(folder)
         variance = uniform_filter(_variance(burst, index, view), 2 * shift.window_px)
         exposures = Exposures(mean, burst.images[index].mean, variance, shift.window_px)
-        if number == 0:
-            in_room, beyond = _wall_and_beyond(scene, index, exposures)
-            chosen = _among(window_centres(mean.shape, shift.window_px), shift.centres_px)
         alone, _, _ = without_known_drift(exposures, in_room, beyond, mount(view.drift_std_px))
         found.append(alone.at(chosen))
     return tuple(found)

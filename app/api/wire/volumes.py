@@ -91,13 +91,14 @@ def _of_bursts(solution: Solution, found: Departures) -> dict[str, Volume]:
     """What is the same for every burst."""
     own_k, mean_k = found.temperature_std_k, solution.temperature_std_k
     whole_k = own_k if mean_k is None else np.hypot(own_k, mean_k)
+    made: tuple[tuple[str, str, Kind, np.ndarray], ...] = (
+        ("T_rms", "fluctuation of T from burst to burst, rms", "derived", found.rms_k),
+        ("T_burst_std", "standard deviation of T in a burst", "uncertainty", whole_k),
+        ("T_departure_std", "standard deviation of a burst's departure", "uncertainty", own_k),
+    )
     return {
         name: Volume(name, "K", label, kind, np.asarray(values, np.float32))
-        for name, label, kind, values in (
-            ("T_rms", "fluctuation of T from burst to burst, rms", "derived", found.rms_k),
-            ("T_burst_std", "standard deviation of T in a burst", "uncertainty", whole_k),
-            ("T_departure_std", "standard deviation of a burst's departure", "uncertainty", own_k),
-        )
+        for name, label, kind, values in made
     }
 
 
