@@ -7,12 +7,16 @@ import re
 import shutil
 import subprocess
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from app.errors import BadInputError
+from app.experiment.folder import write_manifest
+from app.experiment.found import Found
 from app.experiment.results import write_result
+from app.files.toml import to_plain
 from app.report.export import export
 from app.report.openfoam import write_openfoam
 from app.setup.experiment import new_experiment, template
@@ -184,17 +188,24 @@ def test_objects_that_the_result_does_not_know_are_refused(objects, sentence, tm
     assert not (tmp_path / "case.zip").exists()
 
 
-def test_the_export_of_an_experiment_knows_its_objects(tmp_path):
+def test_the_export_of_an_experiment_knows_its_objects_and_what_was_found(tmp_path):
     answers = template("wall-jet") + '\n[[object]]\nkind = "desk"\nposition = ["2 m", "1 m", "0 m"]\n'
     experiment = new_experiment(tmp_path / "lab", answers, "answers.toml")
     folder = experiment.results_folder / "one"
     folder.mkdir(parents=True)
-    write_result(folder / "result.nc", solution(experiment.settings.scene.objects), {})
+    box = RoomObject(name="found 1", lower_m=(0.5, 0.5, 0.0), upper_m=(1.0, 0.9, 1.2))
+    seen = Found(0, 0.1, (0.5, 1.0), (0.0, 1.2), (64.0, 40.0, 88.0, 90.0), "seen", box, True, "It stands.")
+    only_said = replace(
+        seen, box=replace(box, name="found 2", lower_m=(3.2, 2.2, 0.0), upper_m=(3.6, 2.6, 1.0))
+    )
+    only_said = replace(only_said, solved=False)
+    write_manifest(folder, {"found": to_plain((seen, only_said))})
+    write_result(folder / "result.nc", solution((*experiment.settings.scene.objects, box)), {})
     with zipfile.ZipFile(export(tmp_path / "lab", "zip", result=folder)) as packed:
         mesh = Mesh(packed.read("case/system/blockMeshDict").decode())
-    desk_m3 = 1.6 * 0.8 * 0.74
-    assert mesh.volume_m3() == pytest.approx(4 * 3 * 2.7 - desk_m3, rel=1e-6)
-    assert tuple(mesh.patches) == (*WALLS, "desk_1")
+    solid_m3 = 1.6 * 0.8 * 0.74 + 0.5 * 0.4 * 1.2
+    assert mesh.volume_m3() == pytest.approx(4 * 3 * 2.7 - solid_m3, rel=1e-6)
+    assert tuple(mesh.patches) == (*WALLS, "desk_1", "found_1")
 
 
 @pytest.mark.skipif(not shutil.which("blockMesh"), reason="OpenFOAM is not installed here.")
