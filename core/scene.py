@@ -44,38 +44,6 @@ class CameraNoise:
 
 
 @setting
-class View:
-    """One camera. `frames` are averaged into one image; `f_number` with `focal_m` opens an aperture cone."""
-
-    name: str = "camera"
-    """What this camera is called."""
-    camera: Optics
-    """Where it stands and how it looks."""
-    noise: CameraNoise = CameraNoise()
-    """How its frames scatter."""
-    frames: int = 100
-    """How many frames are averaged into one picture."""
-    f_number: float | None = None
-    """The number on the lens; with `focal_m` it opens an aperture cone."""
-    focal_m: float | None = None
-    """Focal length of the lens."""
-    drift_std_px: float = 1.0
-    """Standard deviation of the mount's motion between exposures, at the picture's edge; 0: it stands still."""
-
-    def __post_init__(self) -> None:
-        check_range(
-            "drift_std_px", self.drift_std_px, 0.0, 100.0, "px", "A mount creeps by 0.1 to 1 px in minutes."
-        )
-        check_range("frames", self.frames, 1, 1_000_000, "", "One image is the mean of at least one frame.")
-        if self.f_number is not None:
-            check_range(
-                "f_number", self.f_number, 0.1, 1000.0, "", "It is the number on the lens (f/8 is 8)."
-            )
-        if self.focal_m is not None:
-            check_range("focal_m", self.focal_m, 1e-4, 10.0, "m", "Give metres (25 mm is 0.025 m).")
-
-
-@setting
 class WaveletPattern:
     """Wavelet noise (Cook & DeRose 2005): octave bands, the finest `finest_px` pattern pixels a period."""
 
@@ -144,6 +112,42 @@ class ProjectedPattern:
 
 
 Light = FixedTexture | ProjectedPattern
+
+
+@setting
+class View:
+    """One camera and the wall that it looks at. `frames` are averaged into one image."""
+
+    name: str = "camera"
+    """What this camera is called."""
+    camera: Optics
+    """Where it stands and how it looks."""
+    wall: WallName = "y_max"
+    """The patterned wall that it looks at."""
+    light: Light | None = None
+    """What patterns that wall; without it, the scene's light."""
+    noise: CameraNoise = CameraNoise()
+    """How its frames scatter."""
+    frames: int = 100
+    """How many frames are averaged into one picture."""
+    f_number: float | None = None
+    """The number on the lens; with `focal_m` it opens an aperture cone."""
+    focal_m: float | None = None
+    """Focal length of the lens."""
+    drift_std_px: float = 1.0
+    """Standard deviation of the mount's motion between exposures, at the picture's edge; 0: it stands still."""
+
+    def __post_init__(self) -> None:
+        check_range(
+            "drift_std_px", self.drift_std_px, 0.0, 100.0, "px", "A mount creeps by 0.1 to 1 px in minutes."
+        )
+        check_range("frames", self.frames, 1, 1_000_000, "", "One image is the mean of at least one frame.")
+        if self.f_number is not None:
+            check_range(
+                "f_number", self.f_number, 0.1, 1000.0, "", "It is the number on the lens (f/8 is 8)."
+            )
+        if self.focal_m is not None:
+            check_range("focal_m", self.focal_m, 1e-4, 10.0, "m", "Give metres (25 mm is 0.025 m).")
 
 
 @setting
@@ -390,10 +394,25 @@ class Scene:
     def __post_init__(self) -> None:
         if not self.views:
             raise SettingError("The scene has no view; give at least one camera under [[scene.views]].")
+        names = [view.name for view in self.views]
         for view in self.views:
-            _check_place(f"Camera {view.name!r}", view.camera.position_m, self.room)
+            if names.count(view.name) > 1:
+                raise SettingError(
+                    f"Two views are called {view.name!r}; calibrations and captures name views, so give each a name "
+                    "of its own."
+                )
+            _check_place(f"Camera {view.name!r}", view.camera.position_m, self.room, view.wall)
+            if isinstance(view.light, ProjectedPattern):
+                _check_place(
+                    f"The projector of {view.name!r}", view.light.projector.position_m, self.room, view.wall
+                )
+            if view.light is None and view.wall != "y_max" and isinstance(self.light, ProjectedPattern):
+                raise SettingError(
+                    f"View {view.name!r} looks at {view.wall}, and the scene's projector lights y_max. Give the view "
+                    "a light of its own."
+                )
         if isinstance(self.light, ProjectedPattern):
-            _check_place("The projector", self.light.projector.position_m, self.room)
+            _check_place("The projector", self.light.projector.position_m, self.room, "y_max")
         _check_objects(self)
 
 
@@ -401,13 +420,17 @@ def _check_std(what: str, value: float, unit: str) -> None:
     check_range(what, value, 1e-9, 1e6, unit, "It is one standard deviation: nothing is known exactly.")
 
 
-def _check_place(what: str, position_m: Vector3, room: Box) -> None:
-    """In front of the back wall; farther than 2 km from the room a position is in other units."""
+def _check_place(what: str, position_m: Vector3, room: Box, wall: WallName) -> None:
+    """In front of the wall that it looks at; farther than 2 km from the room a position is in other units."""
     x, y, z = position_m
-    if y >= room.upper_m[1]:
+    face = face_of(wall)
+    place_m = face.place_m(room)
+    if face.inward * (position_m[face.axis] - place_m) <= 0:
+        axis, side = "xyz"[face.axis], "smaller" if face.upper else "larger"
+        named = "the back wall" if wall == "y_max" else f"the wall {wall},"
         raise SettingError(
-            f"{what} at ({x:g}, {y:g}, {z:g}) m is in or behind the back wall "
-            f"y = {room.upper_m[1]:g} m; place it in front of the wall (smaller y)."
+            f"{what} at ({x:g}, {y:g}, {z:g}) m is in or behind {named} {axis} = {place_m:g} m; place it in front of "
+            f"the wall ({side} {axis})."
         )
     reach_m = sum((p - c) ** 2 for p, c in zip(position_m, room.centre_m, strict=True)) ** 0.5
     advice = "Were millimetres given for metres?"

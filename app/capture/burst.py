@@ -17,7 +17,7 @@ from app.experiment.captures import CaptureRecorder
 from app.experiment.folder import Experiment, new_id
 from app.files.disk_space import check_room
 from app.rig.conditions import UNTOLD, Conditions, conditions_of, known_pairs, seconds_on
-from app.rig.open import air_of, clock_of
+from app.rig.open import air_of, clock_of, open_camera
 from drivers.burst import Burst, BurstOutcome, CapturePlan
 from drivers.capture import Abort, OnFrame, OnProgress, Taken, run_capture
 from drivers.errors import DeviceSettingError
@@ -94,9 +94,12 @@ def take(
     source: Mapping[str, Any] | None = None,
     known: tuple[Verdict, ...] = (),
     series: Mapping[str, Any] | None = None,
+    moment: int | None = None,
 ) -> TakenBurst:
     """Take one burst into a new folder below captures/, by `name` where that was given out already.
 
+    The cameras of further views are opened one after the other once the first has ended, and all pictures are one
+    capture; what is said of it is said of all. A raw stack is kept of the first. `moment` is as in `open_camera`.
     `sequence` says which burst of how many it is. `source` says where the frames come from, where that is not the
     rig; `known` are verdicts that the frames cannot tell; `series` is its place between two references. Raises
     AirlensError without room for it, DeviceError.
@@ -106,19 +109,56 @@ def take(
     recorder = CaptureRecorder(experiment.captures_folder / name, plan)
     watch.begun(recorder.folder)
     try:
-        burst = _run(camera, plan, watch, recorder.observe, seconds_on(experiment.settings, told))
-        if burst.outcome is BurstOutcome.ABORTED and watch.stop() == "discard":
+        views = len(experiment.settings.scene.views) if source is None else 1
+        bursts = [_run(camera, plan, watch, recorder.observe, seconds_on(experiment.settings, told))]
+        if views > 1:
+            bursts += _of_other_views(bursts[0], experiment, plan, told, watch, moment)
+        if bursts[-1].outcome is BurstOutcome.ABORTED and watch.stop() == "discard":
             recorder.discard()
-            return TakenBurst(burst, None)
-        burst = judged(experiment, replace(burst, verdicts=(*burst.verdicts, *known)), told)
+            return TakenBurst(bursts[-1], None)
+        bursts[0] = replace(bursts[0], verdicts=(*bursts[0].verdicts, *known))
+        bursts = [judged(experiment, burst, told, view) for view, burst in enumerate(bursts)]
         origin = dict(source) if source is not None else _rig(experiment, plan)
         origin |= known_pairs(conditions_of(experiment.settings, told))
         origin |= {} if sequence is None else {"sequence": sequence}
         origin |= {} if series is None else {"series": dict(series)}
-        return TakenBurst(burst, recorder.keep(burst, origin))
+        return TakenBurst(_together(bursts, experiment), recorder.keep(bursts, origin, views))
     except BaseException:
         recorder.leave()
         raise
+
+
+def _of_other_views(
+    first: Burst,
+    experiment: Experiment,
+    plan: CapturePlan,
+    told: Conditions,
+    watch: BurstWatch,
+    moment: int | None,
+) -> list[Burst]:
+    """The bursts of the views after the first, until one is not complete."""
+    bursts = [first]
+    for view in range(1, len(experiment.settings.scene.views)):
+        if bursts[-1].outcome is not BurstOutcome.COMPLETE:
+            break
+        with open_camera(experiment, air_of(plan.role), view, moment) as camera:
+            seconds = seconds_on(experiment.settings, told)
+            bursts.append(_run(camera, plan, watch, lambda taken: None, seconds))
+    return bursts[1:]
+
+
+def _together(bursts: list[Burst], experiment: Experiment) -> Burst:
+    """The burst that stands for those of all views: the first, or one that ended early, with the verdicts of all."""
+    if len(bursts) == 1:
+        return bursts[0]
+    names = [view.name for view in experiment.settings.scene.views]
+    verdicts = [
+        replace(verdict, name=f"{name}: {verdict.name}")
+        for name, burst in zip(names, bursts, strict=False)
+        for verdict in burst.verdicts
+    ]
+    whole = bursts[-1].outcome is BurstOutcome.COMPLETE
+    return replace(bursts[0 if whole else -1], verdicts=tuple(verdicts))
 
 
 def take_order(

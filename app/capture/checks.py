@@ -23,13 +23,17 @@ from drivers.verdict import Verdict
 MAX_DRIFT_PX = 1.0
 
 
-def judged(experiment: Experiment, burst: Burst, told: Conditions = UNTOLD) -> Burst:
-    """The burst with what the experiment says about it."""
+def judged(experiment: Experiment, burst: Burst, told: Conditions = UNTOLD, view: int = 0) -> Burst:
+    """The burst of a view with what the experiment says about it."""
     if burst.frames == 0:
         return burst
     return replace(
         burst,
-        verdicts=(*burst.verdicts, *_calibration(experiment, told), *_against_reference(experiment, burst)),
+        verdicts=(
+            *burst.verdicts,
+            *_calibration(experiment, told),
+            *_against_reference(experiment, burst, view),
+        ),
     )
 
 
@@ -62,7 +66,7 @@ def _calibration(experiment: Experiment, told: Conditions) -> list[Verdict]:
     return [Verdict("calibration", False, float(len(found)), expected, text) for text in found]
 
 
-def _against_reference(experiment: Experiment, burst: Burst) -> list[Verdict]:
+def _against_reference(experiment: Experiment, burst: Burst, view: int) -> list[Verdict]:
     """What a flow must share with the newest reference, if there is one: its settings, and a still border."""
     if burst.plan.role != "flow":
         return []
@@ -70,12 +74,14 @@ def _against_reference(experiment: Experiment, burst: Burst) -> list[Verdict]:
         reference = load_capture(experiment.latest_capture("reference"))
     except AirlensError:
         return []
-    return [*_settings(reference, burst), *_drift(reference.images[0].mean, burst)]
+    if len(reference.images) <= view:
+        return []
+    return [*_settings(reference, burst, view), *_drift(reference.images[view].mean, burst)]
 
 
-def _settings(reference: Capture, burst: Burst) -> list[Verdict]:
+def _settings(reference: Capture, burst: Burst, view: int) -> list[Verdict]:
     """Exposure and gain as the reference had them; how much they differ, as a part of the reference's."""
-    before = {one["name"]: one["granted"] for one in reference.manifest["views"][0]["settings"]}
+    before = {one["name"]: one["granted"] for one in reference.manifest["views"][view]["settings"]}
     found = []
     for one in burst.settings:
         was = before.get(one.name)

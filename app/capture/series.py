@@ -54,7 +54,7 @@ def take_series(
         own = replace(plan, role=role, settle_s=wait_s)
         with opens(role, place) as camera:
             where = {"id": name, "place": place, "began_s": time.time()}
-            taken.append(take(camera, experiment, own, told, watch, series=where))
+            taken.append(take(camera, experiment, own, told, watch, series=where, moment=place))
         if taken[-1].shortfall:
             raise AirlensError(f"The series ended with its burst {place + 1} of 3. {taken[-1].shortfall}")
     found = between_references(newest_pair(experiment), known_of(experiment).scene)

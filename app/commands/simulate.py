@@ -1,10 +1,13 @@
 """`airlens simulate`."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.progress import Progress
+
+if TYPE_CHECKING:
+    from core.geometry import WallName
 
 Size = Annotated[str, typer.Option(help="Camera size, WIDTHxHEIGHT or WIDTH (3:4).")]
 
@@ -21,6 +24,10 @@ def simulate(
         Path | None,
         typer.Option(help="The air of that room at several moments (NPZ): each flow frame sees its own."),
     ] = None,
+    views: Annotated[
+        str,
+        typer.Option(help="Walls that are patterned, a camera before each: y_max,x_max,z_max; y is y_max."),
+    ] = "y",
     light: Annotated[
         Literal["texture", "projector"], typer.Option(help="What patterns the wall.")
     ] = "texture",
@@ -84,6 +91,7 @@ def simulate(
         stand_off_m=rig_stand_off_m if stand_off is None else stand_off,
         baseline_m=rig_baseline_m if baseline is None else baseline,
         pattern_seed=seed,
+        walls=parse_walls(views),
     )
     shown = changed(WORLDS[world], nuisance or [], drift_px, border, misread)
     camera = shown.camera(seed, noise_free).model_copy(update={"frame_rate_hz": frame_rate})
@@ -106,6 +114,22 @@ def simulate(
             snapshots_path=snapshots,
         )
     typer.echo(f"{experiment}: reference and flow captured. Next: airlens reconstruct {experiment}")
+
+
+def parse_walls(text: str) -> "tuple[WallName, ...]":
+    """'y,x' or 'y_max,x_max' to names of walls. Raises BadInputError."""
+    from app.errors import BadInputError
+    from core.geometry import WALLS
+
+    short: dict[str, WallName] = {"x": "x_max", "y": "y_max", "z": "z_max"}
+    known = short | {wall: wall for wall in WALLS}
+    names = [part.strip() for part in text.split(",")]
+    if not set(names) <= set(known):
+        raise BadInputError(
+            f"The views are {text!r}; expected walls with commas between them, such as y,x or y_max,x_min,z_max: "
+            f"{', '.join(WALLS)}."
+        )
+    return tuple(known[name] for name in names)
 
 
 def parse_size(text: str) -> tuple[int, int]:

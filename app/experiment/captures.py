@@ -312,12 +312,16 @@ class CaptureRecorder:
         self._saved_s = time.monotonic()
         self._checkpoint_s = max(self._checkpoint_s, 10 * (self._saved_s - began_s))
 
-    def keep(self, burst: Burst, origin: Mapping[str, Any] | None = None) -> Path:
-        """Finish the folder. What the device cut short gets no manifest: it is never a measurement."""
+    def keep(self, bursts: Sequence[Burst], origin: Mapping[str, Any] | None = None, views: int = 1) -> Path:
+        """Finish the folder, a burst a view. What a device cut short, or lacks a view, gets no manifest.
+
+        It is no measurement.
+        """
         self._close()
         self._check()
-        if burst.outcome in (BurstOutcome.COMPLETE, BurstOutcome.ABORTED):
-            return write_capture(self.folder, burst, origin=origin)
+        burst = bursts[-1]
+        if len(bursts) == views and burst.outcome in (BurstOutcome.COMPLETE, BurstOutcome.ABORTED):
+            return write_capture(self.folder, bursts, origin=origin)
         write_image(self.folder / "partial.tif", BurstImage(burst.mean, burst.std, burst.frames))
         write_json(self.folder / "incomplete.json", {"role": burst.plan.role} | describe_burst(burst))
         return self.folder

@@ -164,7 +164,9 @@ class RigSettings(Strict):
     """The devices of the rig, and the board that it is calibrated with. No device stands in for one not named."""
 
     camera: CameraSettings | None = None
-    """The camera."""
+    """The camera; of several views, the first one's."""
+    cameras: dict[str, CameraSettings] | None = None
+    """The cameras of the other views, by the view's name; a simulated rig needs none."""
     projector: ProjectorSettings | None = None
     """The projector, where it is spoken to."""
     board: BoardSettings | None = None
@@ -178,6 +180,7 @@ class RigSettings(Strict):
     @property
     def addresses(self) -> tuple[str, ...]:
         """The device files and hosts that this rig opens; simulated twins open none."""
-        camera = (self.camera.device,) if isinstance(self.camera, RealCameraSettings) else ()
+        cameras = (self.camera, *(self.cameras or {}).values())
+        camera = tuple(one.device for one in cameras if isinstance(one, RealCameraSettings))
         named = () if self.projector is None else (self.projector.url,)
         return camera + tuple(url for url in named if not url.startswith("simulated:"))

@@ -37,6 +37,7 @@ from core.plan.shift_noise import shift_noise
 from core.plan.signal import Signal, other_light, shift_map, signal
 from core.plan.verdicts import blindness, broken, verdict
 from core.problem import Problem
+from core.view_frame import facing, turn_of
 
 OnStage = Callable[[str], object]
 # JSON has no infinity.
@@ -81,7 +82,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
                 verdict(problem.scene, n, flow, s, view.other_light_shift_p99_px)
                 for n, (s, view) in enumerate(zip(signals, views, strict=True))
             ),
-            blindness(determined),
+            blindness(determined, [view.name for view in problem.scene.views]),
             *broken(choices),
         ],
     )
@@ -146,14 +147,15 @@ def signals_of(problem: Problem, flow: ExpectedFlow) -> tuple[Signal, ...]:
 
 
 def _view_line(
-    problem: Problem, view: int, flow: ExpectedFlow, found: Signal, places: PlacesLine
+    problem: Problem, view: int, flow: ExpectedFlow, found: Signal, places: PlacesLine | None
 ) -> ViewLine:
     scene, noise_px = problem.scene, found.noise.mean_px
-    other = other_light(scene, view)
+    own, number = facing(scene, view)
+    other, turn = other_light(own, number), turn_of(scene, view)
     frames, visible = scene.views[view].frames, np.isfinite(noise_px) and found.snr > 0
     return ViewLine(
         name=scene.views[view].name,
-        light=scene.light.kind,
+        light=own.light.kind,
         window_px=found.noise.window_px,
         noise_px=noise_px if np.isfinite(noise_px) else None,
         shift_median_px=found.shift.percentile_px(50),
@@ -167,14 +169,19 @@ def _view_line(
         frames=frames,
         frames_needed=frames * found.frames_factor if visible and found.frames_factor < 1e12 else None,
         other_light=other.light.kind,
-        other_light_shift_p99_px=shift_map(other, view, flow, found.noise.window_px).percentile_px(99),
+        other_light_shift_p99_px=shift_map(
+            other, number, flow.facing(turn), found.noise.window_px
+        ).percentile_px(99),
         map=_map(found),
         places=places,
     )
 
 
-def _places(problem: Problem, view: int, flow: ExpectedFlow) -> PlacesLine:
+def _places(problem: Problem, view: int, flow: ExpectedFlow) -> PlacesLine | None:
+    """None of a view of another wall: the map is of the floor before y_max."""
     scene = problem.scene
+    if scene.views[view].wall != "y_max":
+        return None
     found = place_map(scene, view, flow)
     return PlacesLine(
         x_m=found.x_m.tolist(),

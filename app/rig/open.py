@@ -13,7 +13,7 @@ from app.rig.cameras import open_real
 from app.rig.inventory import found_cameras
 from app.rig.practice_room import PracticeRoom
 from app.rig.projectors import open_real_projector
-from app.rig.rendered import AirState, moving_pictures, seen_picture
+from app.rig.rendered import VIEWS_APART, AirState, moving_pictures, seen_picture
 from app.rig.stage import RealStage, Stage, Task
 from calibration.board import Board
 from core.geometry import Optics
@@ -31,20 +31,32 @@ LONGEST_S = 3600.0
 
 
 def open_camera(experiment: Experiment, air: AirState, view: int = 0, moment: int | None = None) -> Camera:
-    """Open the experiment's camera. `air` says what a simulated room does; a real room is as it is.
+    """Open the camera of a view. `air` says what a simulated room does; a real room is as it is.
 
     A simulated mount walks: `moment` is how many steps it has taken, by default one where the air moves.
     """
-    settings = named_camera(experiment)
+    settings = named_camera(experiment, view)
     if isinstance(settings, SimulatedCameraSettings):
         steps = int(air == "moving") if moment is None else moment
         return _simulated_camera(experiment, settings, air, view, steps)
     return open_real(settings)
 
 
-def named_camera(experiment: Experiment) -> CameraSettings:
-    """The camera that the experiment names. Raises BadInputError, with the cameras found, where it names none."""
-    settings = experiment.settings.rig.camera
+def named_camera(experiment: Experiment, view: int = 0) -> CameraSettings:
+    """The camera that the experiment names for a view; all are simulated where the first one is.
+
+    Raises BadInputError, with the cameras found, where it names none.
+    """
+    rig = experiment.settings.rig
+    settings = rig.camera
+    if view > 0 and settings is not None and not isinstance(settings, SimulatedCameraSettings):
+        name = experiment.settings.scene.views[view].name
+        settings = (rig.cameras or {}).get(name)
+        if settings is None:
+            raise BadInputError(
+                f"The rig of {experiment.folder.name} names no camera for its view {name!r}. Add to its "
+                f'experiment.toml: [rig.cameras."{name}"] with the same keys as [rig.camera].'
+            )
     if settings is not None:
         return settings
     found = ", ".join(f"{one.device} ({one.name})" for one in found_cameras() if one.device) or "none"
@@ -178,7 +190,7 @@ def _simulated_camera(
         image,
         moving=moving,
         frame_rate_hz=settings.frame_rate_hz,
-        seed=2 * settings.seed + steps,
+        seed=2 * settings.seed + steps + VIEWS_APART * view,
         noise=_sensor(scene, settings, view),
         flicker=settings.world.flicker,
         exposure_s=settings.exposure_s,

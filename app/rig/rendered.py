@@ -21,9 +21,12 @@ from core.plan.print_choice import suited_print
 from core.rays.visibility import first_hit, wall_points
 from core.render import render_flow, render_reference
 from core.scene import ProjectedPattern, Scene
+from core.view_frame import facing
 
 # The print around a simulated room: as fine as the pattern, but another one.
 FRAME_SEED = 1_000_003
+# Seeds of one view after those of another: each camera has noise and a mount of its own.
+VIEWS_APART = 7919
 
 # Rows drawn at a time; what a shadow leaves of the light; periods of what is seen on an object, along x, y, z.
 _ROWS, _UNLIT, _FOLDS_M = 256, 0.02, np.array([0.31, 0.97, 0.23])
@@ -41,7 +44,7 @@ def seen_picture(
     volume = read_volume(experiment.file(settings.room))
     field = None if air == "still" else volume_field(volume, scene)
     picture = _rendered(volume, settings, scene, field, view)
-    return spoiled(picture, settings.world, steps, settings.seed)
+    return spoiled(picture, settings.world, steps, settings.seed + VIEWS_APART * view)
 
 
 def moving_pictures(
@@ -61,7 +64,7 @@ def moving_pictures(
     def picture(index: int) -> Picture:
         field = temperature_field(snapshots.temperature_k[index], scene)
         drawn = _rendered(volume, settings, scene, field, view)
-        return spoiled(drawn, settings.world, steps, settings.seed)
+        return spoiled(drawn, settings.world, steps, settings.seed + VIEWS_APART * view)
 
     return lambda time_s: picture(snapshots.nearest(time_s))
 
@@ -70,7 +73,13 @@ def _mounted(experiment: Experiment, settings: SimulatedCameraSettings, view: in
     """The scene after so many steps of the mount."""
     scene = _as_it_is(experiment, settings)
     for step in range(steps):
-        scene = drifted(scene, view, settings.drift_px, settings.world.breathing_px, settings.seed + step)
+        scene = drifted(
+            scene,
+            view,
+            settings.drift_px,
+            settings.world.breathing_px,
+            settings.seed + step + VIEWS_APART * view,
+        )
     return scene
 
 
@@ -91,9 +100,10 @@ def _rendered(
 ) -> Picture:
     """The room through this air, or through still air; with its frame and its objects."""
     image = render_reference(scene, view) if field is None else render_flow(scene, field, view)
-    framed = _framed(image, scene, view) if settings.border == "print" else image
     # What stands in the room, whether or not the scene states it.
-    return with_objects(framed, replace(scene, objects=room_objects(volume)), view)
+    scene, view = facing(replace(scene, objects=room_objects(volume)), view)
+    framed = _framed(image, scene, view) if settings.border == "print" else image
+    return with_objects(framed, scene, view)
 
 
 def with_objects(image: Picture, scene: Scene, view: int) -> Picture:

@@ -24,7 +24,7 @@ from app.sheets.record import keep_record, version, write_sheets
 from core.pattern import pattern_parts
 from core.plan.print_choice import (
     LEAST_PERIOD_PX,
-    camera_pixel_m,
+    coarsest,
     finest_period_m,
     period_in_camera_px,
     suited_print,
@@ -100,8 +100,8 @@ def choose_pattern(folder: Path) -> Experiment:
         experiment = open_experiment(folder)
         scene = experiment.settings.scene
         _print_of(scene)
-        camera = max((view.camera for view in scene.views), key=lambda one: camera_pixel_m(one, scene.room))
-        distance_m = scene.room.upper_m[1] - camera.position_m[1]
+        camera, room = coarsest(scene)
+        distance_m = room.upper_m[1] - camera.position_m[1]
         light = suited_print(camera, distance_m, getattr(scene.light.pattern, "seed", 0))
         changed = experiment.settings.model_copy(update={"scene": replace(scene, light=light)})
         return save_settings(folder, changed)

@@ -1,7 +1,7 @@
 """From a room volume to a scene: the rig that looks at it, and what an operator would know of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,6 +17,7 @@ from core.plan.print_choice import suited_print
 from core.scene import (
     BoundaryInformation,
     CameraNoise,
+    FixedTexture,
     Heater,
     Inlet,
     Light,
@@ -29,6 +30,7 @@ from core.scene import (
     Wall,
     WaveletPattern,
 )
+from core.view_frame import turn_to
 
 Information = Literal["paper", "operator", "surveyed"]
 RigName = Literal["paper", "lab"]
@@ -57,7 +59,8 @@ RIG_PLACES: Mapping[RigName, tuple[float, Vector2]] = {"paper": (30.5, (1.0, 0.0
 class RigOptions:
     """The rig to simulate. Lengths in metres; `baseline_m` is projector minus camera (x, z).
 
-    The picture reaches `border_px` beyond the wall at least, which windows need and single pixels do not.
+    The picture reaches `border_px` beyond the wall at least, which windows need and single pixels do not. `walls` are
+    patterned, each with a camera before it, and with a print or projector of its own.
     """
 
     camera_px: tuple[int, int] = (4096, 3072)
@@ -69,12 +72,17 @@ class RigOptions:
     projector_px: tuple[int, int] = (1920, 1200)
     pattern_seed: int = 0
     border_px: int = BORDER_PX
+    walls: tuple[WallName, ...] = ("y_max",)
 
     def __post_init__(self) -> None:
         if self.frames < 1 or self.full_well_e <= 0 or min(self.camera_px) < 16:
             raise BadInputError(
                 f"frames {self.frames}, full well {self.full_well_e:g} e-, camera {self.camera_px} px: expected "
                 "at least 1 frame, a positive full well, and a camera of 16 x 16 px or more."
+            )
+        if not self.walls or len(set(self.walls)) < len(self.walls):
+            raise BadInputError(
+                f"The views look at {', '.join(self.walls) or 'no wall'}; expected each wall once, and one at least."
             )
 
 
@@ -86,15 +94,39 @@ def room_scene(volume: RoomVolume, options: RigOptions, information: Information
             f"The stand-off is {options.stand_off_m:g} m; expected the distance from camera to back wall, "
             "above 0."
         )
-    camera = _covering(room, options.camera_px, options.border_px, options.stand_off_m, (0.0, 0.0))
-    noise = CameraNoise(full_well_e=options.full_well_e)
+    views = tuple(_view(room, options, number) for number in range(len(options.walls)))
+    # A view of another wall has its own light; the scene's is then nobody's.
+    light = views[0].light or _light(room, views[0].camera, options)
     return Scene(
         room=room,
         air=_air(volume),
-        views=(View(camera=camera, noise=noise, frames=options.frames),),
-        light=_light(room, camera, options),
+        views=views,
+        light=light if views[0].wall == "y_max" or light.kind == "texture" else FixedTexture(),
         boundary=tuple(known_boundary(volume, information)),
         objects=room_objects(volume),
+    )
+
+
+def _view(room: Box, options: RigOptions, number: int) -> View:
+    """The camera before one of the walls; one that does not look at y_max has a light of its own."""
+    wall = options.walls[number]
+    turn = turn_to(wall)
+    facing_it = turn.box(room)
+    camera = _covering(facing_it, options.camera_px, options.border_px, options.stand_off_m, (0.0, 0.0))
+    light = None
+    if wall != "y_max":
+        own = replace(options, pattern_seed=options.pattern_seed + number)
+        light = _light(facing_it, camera, own)
+        if isinstance(light, ProjectedPattern):
+            light = replace(light, projector=turn.back().optics(light.projector))
+        camera = turn.back().optics(camera)
+    return View(
+        name="camera" if number == 0 else f"camera at {wall}",
+        camera=camera,
+        wall=wall,
+        light=light,
+        noise=CameraNoise(full_well_e=options.full_well_e),
+        frames=options.frames,
     )
 
 

@@ -6,7 +6,7 @@ from scipy.stats import norm
 
 from core.estimate.least_squares import Posterior
 from core.estimate.observation import Observations
-from core.estimate.prior import FITTED_AS_ONE, Prior
+from core.estimate.prior import Prior, looked_through
 from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
@@ -196,11 +196,10 @@ def undetermined(problem: Problem) -> list[str]:
         ]
     unknown = unknown_walls(problem.scene)
     if unknown:
-        alike = (
-            " (y_min and y_max as one: the camera looks through both)"
-            if set(FITTED_AS_ONE) <= set(unknown)
-            else ""
-        )
+        through = looked_through(problem.scene)
+        alike = ""
+        if through and set(through) <= set(unknown):
+            alike = f" ({' and '.join(through)} as one: the camera looks through both)"
         return [
             f"The heat through {', '.join(unknown)} is not stated; it was fitted to the measurements{alike}. "
             "The velocity depends on it: stating a wall's temperature, or 'adiabatic', helps more than more frames."

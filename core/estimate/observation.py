@@ -23,6 +23,7 @@ from core.rays.visibility import away_from_walls
 from core.room.room_grid import AXES
 from core.room.vertices import RoomFields, linear_matrix
 from core.scene import Outlet, Scene
+from core.view_frame import facing
 
 _BLOCKS_ACROSS = 28
 # Kinds of data in `Observations.values` whose neighbours have correlated errors.
@@ -63,7 +64,7 @@ def shift_blocks(
 ) -> ShiftBlocks | None:
     """Pool one view's windows; None if no window looks at the back wall away from its edges."""
     operator = build(scene, view, measured.centres_px, vertices, float(measured.window_px))
-    block_px = _block_px(scene.room, operator, measured)
+    block_px = _block_px(facing(scene, view)[0].room, operator, measured)
     cell = np.floor(measured.centres_px / block_px).astype(int)
     used = away_from_walls(scene, view, measured.centres_px, WALL_MARGIN)
     if not used.any():

@@ -4,7 +4,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Float
 
-from core.estimate.prior import FITTED_AS_ONE, Prior
+from core.estimate.prior import Prior
 from core.geometry import WALLS
 
 _ABOVE = "temperature above ambient (K)"
@@ -41,6 +41,7 @@ def _readable(name: str, prior: Prior) -> str:
     n = int(index or 0)
     what, of = _WORDS[stem]
     wall = WALLS[n % len(WALLS)]
-    if prior.front_and_back_tied() and wall in FITTED_AS_ONE:
-        wall = " and ".join(FITTED_AS_ONE)
+    tied = prior.tied()
+    if tied and wall in tied:
+        wall = " and ".join(tied)
     return f"{what.format(n=n + 1, wall=wall)}: {of}"

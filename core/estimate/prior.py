@@ -20,12 +20,13 @@ from core.estimate.balance import (
     heat_balance_m_s,
     supply_m3_s,
 )
-from core.geometry import WALLS
+from core.geometry import WALLS, WallName
 from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomLayout, RoomParameters, SuspectedHeater
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.scene import Heater, Inlet, Scene
+from core.view_frame import looked_along
 
 # Walls' heat coefficients are known within a factor of two: one sigma is 0.6 in the logarithm.
 _WALL_HEAT_STD = 0.6
@@ -46,9 +47,6 @@ _GUESSED_VISCOSITY_STD = 1.5
 _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
 # Parameters of the walls, by the beginnings of their names.
 WALL_PARAMETERS = ("wall_excess_k", "log_heat")
-# The camera looks through the first wall onto the second: if both are unknown they are fitted as one.
-FITTED_AS_ONE = ("y_min", "y_max")
-_NEAR, _FAR = (WALLS.index(name) for name in FITTED_AS_ONE)
 
 
 class Prior(eqx.Module):
@@ -63,12 +61,17 @@ class Prior(eqx.Module):
     supply_m3_s: Float[np.ndarray, " inlets"]
     leaving_excess_k: float | None = eqx.field(static=True)
     heat_capacity_j_m3_k: float = eqx.field(static=True, default=Air().heat_capacity_j_m3_k)
+    # The walls that every camera looks through and onto, where all look along one axis.
+    looked_through: tuple[WallName, WallName] | None = eqx.field(static=True, default=None)
 
     def active(self) -> np.ndarray:
         """Indices of the fitted parameters in the flattened vector."""
         std = self.std
-        if self.front_and_back_tied():
-            std = eqx.tree_at(lambda p: p.wall_excess_k, std, std.wall_excess_k.at[_FAR].set(0.0))
+        tied = self.tied()
+        if tied:
+            std = eqx.tree_at(
+                lambda p: p.wall_excess_k, std, std.wall_excess_k.at[WALLS.index(tied[1])].set(0.0)
+            )
         return np.flatnonzero(np.asarray(ravel_pytree(std)[0]) > 0)
 
     def unknown_walls(self) -> list[str]:
@@ -76,9 +79,10 @@ class Prior(eqx.Module):
         spread_k = np.asarray(self.std.wall_excess_k)
         return [name for name, std_k in zip(WALLS, spread_k, strict=True) if std_k > 0]
 
-    def front_and_back_tied(self) -> bool:
-        """Whether y_min and y_max are fitted as one: every ray passes both, so images do not distinguish them."""
-        return set(FITTED_AS_ONE) <= set(self.unknown_walls())
+    def tied(self) -> tuple[WallName, WallName] | None:
+        """Two unknown walls that are fitted as one: every ray passes both, so images see no difference."""
+        through = self.looked_through
+        return through if through and set(through) <= set(self.unknown_walls()) else None
 
     def parameters(self, vector: Float[np.ndarray, " active"]) -> RoomParameters:
         """All parameters for a vector of the fitted ones, which is in prior deviations from the mean."""
@@ -88,8 +92,10 @@ class Prior(eqx.Module):
         flat = np.asarray(mean, float).copy()
         flat[chosen] += vector * std[chosen]
         found = restore(jnp.asarray(flat, mean.dtype))
-        if self.front_and_back_tied():
-            walls = found.wall_excess_k.at[_FAR].set(found.wall_excess_k[_NEAR])
+        tied = self.tied()
+        if tied:
+            near, far = (WALLS.index(wall) for wall in tied)
+            walls = found.wall_excess_k.at[far].set(found.wall_excess_k[near])
             found = eqx.tree_at(lambda p: p.wall_excess_k, found, walls)
         moved = found.wall_log_heat + self._balanced(found)
         return eqx.tree_at(lambda p: p.wall_log_heat, found, moved)
@@ -181,7 +187,15 @@ def room_prior(
         *object_deviations(scene),
     )
     leaving = None if balanced is None else leaving_excess_k(problem)
-    return Prior(mean, std, supply_m3_s(layout), leaving, scene.air.heat_capacity_j_m3_k)
+    return Prior(
+        mean, std, supply_m3_s(layout), leaving, scene.air.heat_capacity_j_m3_k, looked_through(scene)
+    )
+
+
+def looked_through(scene: Scene) -> tuple[WallName, WallName] | None:
+    """The two walls at the ends of the only axis that cameras look along; None where they look along several."""
+    axes = looked_along(scene)
+    return (WALLS[2 * axes[0]], WALLS[2 * axes[0] + 1]) if len(axes) == 1 else None
 
 
 def object_means(scene: Scene) -> tuple[Array, Array, Array]:

@@ -12,6 +12,7 @@ from core.plan.print_choice import finest_period
 from core.plan.ray_choices import irradiance, probe_of, projector_order, tracer_of, tracing
 from core.plan.signal import Signal
 from core.scene import FixedTexture, ProjectedPattern, Scene
+from core.view_frame import facing
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ def resolve(scene: Scene, flow: ExpectedFlow, signals: tuple[Signal, ...]) -> Re
         made += [order, lit]
     if isinstance(scene.light, FixedTexture):
         made.append(finest_period(scene.light, scene))
-    cone, data = aperture(scene, view, signal), data_term(scene, view, signal)
+    cone, data = aperture(*facing(scene, view), signal), data_term(scene, view, signal)
     settled = replace(
         scene,
         rays=replace(rays, aperture_cone=cone.value),

@@ -4,7 +4,7 @@ If a supply or heaters are stated the room is marched on a coarse grid (seconds)
 known contrast stands in the middle of the room. The shift is right within a factor of about 1.5.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -23,6 +23,7 @@ from core.room.march import MarchSettings
 from core.room.step import longest_step_s
 from core.scene import Heater, Inlet, Scene, Wall
 from core.setting import SettingError
+from core.view_frame import Turn
 
 Volume = Float[np.ndarray, "nx ny nz"]
 
@@ -51,6 +52,13 @@ class ExpectedFlow:
     def excess_refractivity(self, air: Air) -> Float[Array, "nx ny nz"]:
         """N - N0 on the vertices."""
         return air.excess_refractivity(jnp.asarray(self.excess_k, jnp.float32))
+
+    def facing(self, turn: Turn) -> "ExpectedFlow":
+        """The same flow in a view's own frame."""
+        if turn.is_none:
+            return self
+        grid = VertexGrid(turn.box(self.grid.box), turn.shape(self.grid.shape))
+        return replace(self, grid=grid, excess_k=np.asarray(turn.volume(jnp.asarray(self.excess_k))))
 
     def field(self, air: Air) -> SplineField:
         """Smooth through the vertices: the slope of a trilinear field jumps, that of air does not."""

@@ -33,6 +33,8 @@ class Seen:
     boundary: float
     both: float
     singular_values: Float[np.ndarray, " modes"]
+    # What the images of the first view, of the first two, and so on fix.
+    first_views: tuple[float, ...]
 
 
 def seen(problem: Problem, flow: ExpectedFlow, signals: tuple[Signal, ...]) -> Seen:
@@ -49,16 +51,20 @@ def seen(problem: Problem, flow: ExpectedFlow, signals: tuple[Signal, ...]) -> S
         matrix = np.asarray(_columns(operator, size))
         whitened = matrix.transpose(1, 2, 0) / np.array(found.noise.std_px)[None, :, None]
         rows.append(whitened.reshape(-1, size) * (-per_k * found.shift.stride))
-    images = np.concatenate(rows) @ root
+    rows = [row @ root for row in rows]
+    images = np.concatenate(rows)
+    share = _share(images, root)
+    first_views = tuple(_share(np.concatenate(rows[:n]), root) for n in range(1, len(rows)))
     known = _known_rows(problem, grid) @ root
     values = np.linalg.svd(images, compute_uv=False)
     return Seen(
         size,
         int(np.sum(values > 1.0)),
-        _share(images, root),
+        share,
         _share(known, root),
         _share(np.concatenate([images, known]), root),
         values,
+        (*first_views, share),
     )
 
 

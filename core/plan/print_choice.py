@@ -3,6 +3,7 @@
 from core.geometry import Box, Optics
 from core.plan.choice import Choice
 from core.scene import DotPattern, FixedTexture, Pattern, Scene, WaveletPattern
+from core.view_frame import facing
 
 # Finer bands alias in the camera: at 3 px a drift of 0.1 px is measured 0.6 % wrong, at 5 px 0.2 %.
 LEAST_PERIOD_PX = 5.0
@@ -14,6 +15,14 @@ PATTERN_PX_A_PIXEL = 2
 def camera_pixel_m(camera: Optics, room: Box) -> float:
     """One pixel's width on the back wall, straight ahead."""
     return (room.upper_m[1] - camera.position_m[1]) / camera.focal_px[0]
+
+
+def coarsest(scene: Scene) -> tuple[Optics, Box]:
+    """Of the cameras that see by the scene's light the one of the largest pixels on its wall, in its own frame."""
+    seeing = [n for n, view in enumerate(scene.views) if view.light is None] or list(range(len(scene.views)))
+    frames = [facing(scene, n) for n in seeing]
+    found = [(own.views[n].camera, own.room) for own, n in frames]
+    return max(found, key=lambda of: camera_pixel_m(*of))
 
 
 def suited_print(camera: Optics, distance_m: float, seed: int) -> FixedTexture:
@@ -37,7 +46,7 @@ def finest_period_px(pattern: Pattern) -> float:
 
 def period_in_camera_px(light: FixedTexture, scene: Scene) -> float:
     """The finest period in pixels of the camera that sees it coarsest, were the scene lit by this print."""
-    return finest_period_m(light) / max(camera_pixel_m(view.camera, scene.room) for view in scene.views)
+    return finest_period_m(light) / camera_pixel_m(*coarsest(scene))
 
 
 def finest_period(light: FixedTexture, scene: Scene) -> Choice:

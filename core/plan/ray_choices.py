@@ -20,6 +20,7 @@ from core.render import pixel_geometry
 from core.render.irradiance import irradiance_factor
 from core.render.shift import wall_offset_m
 from core.scene import Scene
+from core.view_frame import facing, turn_of
 
 _RAYS = 1024
 # A quarter apart at most, so that the fewest steps that serve cost little less.
@@ -58,10 +59,12 @@ def probe_of(scene: Scene, view: int, flow: ExpectedFlow, signal: Signal) -> Pro
     strongest = np.argsort(size)[::-1][: _RAYS // 2]
     anywhere = np.random.default_rng(0).choice(len(centres), min(_RAYS // 2, len(centres)), replace=False)
     chosen = centres[np.resize(np.concatenate([strongest, anywhere]), _RAYS)]
+    field = flow.facing(turn_of(scene, view)).field(scene.air)
+    scene, view = facing(scene, view)
     camera = scene.views[view].camera
     px_per_m = max(camera.focal_px) / (scene.room.upper_m[1] - camera.position_m[1])
     limit_px = SHARE * signal.noise.mean_px
-    return Probe(scene, view, chosen, flow.field(scene.air), limit_px, px_per_m)
+    return Probe(scene, view, chosen, field, limit_px, px_per_m)
 
 
 def tracer_of(kind: str, steps: int, scene: Scene) -> AbstractRayTracer:

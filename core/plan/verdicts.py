@@ -1,5 +1,6 @@
 """Verdicts in words: what this rig can see, and what would help where it cannot."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from core.plan.observability import Seen
 from core.plan.signal import VISIBLE, Signal, lever_m
 from core.rays.visibility import hidden_by_objects, sees_wall
 from core.scene import ProjectedPattern, Scene
+from core.view_frame import facing, turn_of
 
 _SAME_PLACE_M = 0.01
 # Places of the picture, an axis, where the wall is looked for; a share of the wall that is much to hide.
@@ -18,7 +20,8 @@ _PROBES, _TOO_MUCH = 64, 0.4
 
 def verdict(scene: Scene, view: int, flow: ExpectedFlow, found: Signal, other_p99_px: float) -> str:
     """One view's sentences: visible or not, what it would need, and how much of the wall objects hide."""
-    return _verdict(scene, view, flow, found, other_p99_px) + hidden_wall(scene, view, found.noise.window_px)
+    said = _verdict(*facing(scene, view), flow.facing(turn_of(scene, view)), found, other_p99_px)
+    return said + hidden_wall(scene, view, found.noise.window_px)
 
 
 def hidden_wall(scene: Scene, view: int, window_px: int) -> str:
@@ -94,14 +97,23 @@ def _rounded_up(value: float) -> int:
     return int(np.ceil(value / digits) * digits)
 
 
-def blindness(found: Seen) -> str:
-    """What the picture leaves open, and what the boundary adds."""
-    return (
+def blindness(found: Seen, names: Sequence[str]) -> str:
+    """What the pictures of these views leave open, what each view adds, and what the boundary adds."""
+    return _added(found, names) + (
         f"The images fix {found.modes_seen} of {found.modes} smooth patterns of temperature: "
         f"{100 * found.images:.0f} % of an unknown flow's variance; what is known at the boundary alone "
         f"{100 * found.boundary:.0f} %, both {100 * found.both:.0f} %. What varies along the line of sight "
         "only is in none of the pictures."
     )
+
+
+def _added(found: Seen, names: Sequence[str]) -> str:
+    if len(names) < 2:
+        return ""
+    alone, *more = found.first_views
+    said = [f"{names[0]!r} alone fixes {100 * alone:.0f} %"]
+    said += [f"with {name!r} it is {100 * share:.0f} %" for name, share in zip(names[1:], more, strict=True)]
+    return f"Of an unknown flow's variance {', '.join(said)}. "
 
 
 def broken(choices: tuple[Choice, ...]) -> list[str]:

@@ -21,23 +21,26 @@ from core.rays.paths import AbstractWallPaths, Fan
 from core.rays.separable import lattice_through, separable_paths
 from core.scene import ProjectedPattern, Scene
 from core.setting import SettingError
+from core.view_frame import Turn, facing, turn_of
 
 
 class StraightRayOperator(eqx.Module):
     """displacement_px = A (N - N0): the motion of the pattern that the camera sees, (column, row).
 
+    `shape` is that of the room's vertices; the paths are those of the view's own frame, to which `turn` leads.
     `lit` are the projector's paths, whose shift counts against the camera's; None for a print. Pass an
     operator into jitted functions as an argument: closed over, its matrices become program constants.
     """
 
     shape: tuple[int, int, int] = eqx.field(static=True)
+    turn: Turn = eqx.field(static=True)
     seen: AbstractWallPaths
     lit: AbstractWallPaths | None
     px_per_m: Float[Array, "windows 2 2"]
 
     def apply(self, excess: Float[Array, "nx ny nz"]) -> Float[Array, "windows 2"]:
         """Displacement [px] of each pixel for N - N0 on the vertices, index order [ix, iy, iz]."""
-        excess = jnp.asarray(excess)
+        excess = self.turn.volume(jnp.asarray(excess))
         shift_m = self.seen.shift_m(excess)
         if self.lit is not None:
             shift_m = shift_m - self.lit.shift_m(excess)
@@ -51,7 +54,7 @@ class StraightRayOperator(eqx.Module):
     def chosen(self, rows: Int[Array, " some"]) -> "StraightRayOperator":
         """The operator of some of its pixels, for mini-batches; works on traced indices."""
         lit = None if self.lit is None else self.lit.chosen(rows)
-        return StraightRayOperator(self.shape, self.seen.chosen(rows), lit, self.px_per_m[rows])
+        return StraightRayOperator(self.shape, self.turn, self.seen.chosen(rows), lit, self.px_per_m[rows])
 
 
 def build(
@@ -75,19 +78,21 @@ def build(
         raise SettingError(
             f"View {view} has no pixel or window to see the room by. Check that the wall is in the picture."
         )
+    turn = turn_of(scene, view)
+    scene, own = facing(scene, view)
     with jax.enable_x64(True):
-        lens = pinhole(scene.views[view].camera)
+        lens = pinhole(scene.views[own].camera)
         points_m, px_per_m, seen = map(np.asarray, _wall(scene.room, lens, jnp.asarray(pixels, jnp.float64)))
         origins_m = [np.asarray(lens.position_m)]
         if isinstance(scene.light, ProjectedPattern):
             origins_m.append(np.array(scene.light.projector.position_m, float))
             seen = seen & np.asarray(_reaches(scene.room, jnp.asarray(origins_m[1]), jnp.asarray(points_m)))
     footprint_m = window_px / np.median(np.abs(px_per_m[:, [0, 1], [0, 1]]), axis=0)
-    paths = [_paths(scene.room, shape, Fan(o, points_m), footprint_m, seen) for o in origins_m]
+    paths = [_paths(scene.room, turn.shape(shape), Fan(o, points_m), footprint_m, seen) for o in origins_m]
     # The pattern moves against the shift of the point that is seen.
     px_per_m = -px_per_m * seen[:, None, None] / (1.0 + scene.air.ambient_refractivity)
     lit = paths[1] if len(paths) > 1 else None
-    return StraightRayOperator(shape, paths[0], lit, jnp.asarray(px_per_m, jnp.float32))
+    return StraightRayOperator(shape, turn, paths[0], lit, jnp.asarray(px_per_m, jnp.float32))
 
 
 def _paths(

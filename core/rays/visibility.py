@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float
 from core.objects import RoomObject
 from core.rays.optics import pinhole
 from core.scene import ProjectedPattern, Scene
+from core.view_frame import facing, turn_of
 
 # Air so near to an object is in a layer that a room's grid does not resolve: rays through it are left out.
 _SKIN_M = 0.05
@@ -21,6 +22,7 @@ def sees_wall(
     A negative margin asks for the wall and a strip around it. Else what an object hides is not seen, and no ray
     passes an object by less than the margin.
     """
+    scene, view = facing(scene, view)
     point, range_m = _on_the_wall(scene, view, pixels)
     inside = _inside(
         scene, point, margin_px * range_m / min(scene.views[view].camera.focal_px) * np.ones((2, 1))
@@ -35,6 +37,7 @@ def hidden_by_objects(
 
     `margin_px`: objects count as so much larger, as the camera sees that length on the wall.
     """
+    scene, view = facing(scene, view)
     hidden = np.zeros(len(pixels), bool)
     if scene.objects:
         margin_m = margin_px * _least_range_m(scene, view) / min(scene.views[view].camera.focal_px)
@@ -46,6 +49,7 @@ def away_from_walls(
     scene: Scene, view: int, pixels: Float[np.ndarray, "points 2"], share: float
 ) -> Bool[np.ndarray, " points"]:
     """Whether pixels see the back wall at least `share` of the room's size inside its edges, and past objects."""
+    scene, view = facing(scene, view)
     size_m = np.asarray(scene.room.size_m)[[0, 2]]
     inside = _inside(scene, _on_the_wall(scene, view, pixels)[0], share * size_m[:, None])
     return inside & ~_behind_objects(scene, view, pixels, _SKIN_M) if scene.objects else inside
@@ -72,8 +76,9 @@ def _behind_objects(
 def wall_points(
     scene: Scene, view: int, pixels: Float[np.ndarray, "points 2"]
 ) -> Float[np.ndarray, "points 3"]:
-    """Where each pixel looks on the plane of the back wall [m]; NaN where it looks away."""
-    return _on_the_wall(scene, view, pixels)[0]
+    """Where each pixel looks on the plane of its view's wall [m]; NaN where it looks away."""
+    point_m, _ = _on_the_wall(*facing(scene, view), pixels)
+    return point_m @ turn_of(scene, view).matrix
 
 
 def first_hit(

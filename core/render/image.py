@@ -15,6 +15,7 @@ from core.render.pixel_geometry import pixel_geometry
 from core.render.pixels import Exposure, lens_points, pattern_motion
 from core.render.render_choice import RenderChoice, choose
 from core.scene import Scene
+from core.view_frame import facing, field_facing, turn_of
 
 _PIXELS_A_BLOCK = 2**18
 
@@ -30,6 +31,8 @@ def render_flow(scene: Scene, field: AbstractField, view: int = 0) -> Float32[np
 
 
 def _render(scene: Scene, view: int, field: AbstractField | None) -> Float32[np.ndarray, "rows cols"]:
+    field = None if field is None else field_facing(field, turn_of(scene, view))
+    scene, view = facing(scene, view)
     camera = scene.views[view].camera
     choice = choose(scene, view, field)
     pattern = jnp.asarray(pattern_image(scene))

@@ -17,6 +17,7 @@ from core.rays.bundle import RayOutcome, Rays, clip_ray
 from core.rays.optics import Pinhole, pinhole
 from core.render.light import AbstractPatternMap, ProjectorMap, coordinate_jacobian, pattern_map
 from core.scene import Scene
+from core.setting import SettingError
 
 
 class PixelGeometry(eqx.Module):
@@ -47,8 +48,15 @@ def pixel_geometry(
     """Geometry of sensor positions (column, row), float32 out of float64. Cost: below 1 us a position.
 
     `lens_point_m` is the place on the aperture, along the sensor's columns and rows, from which the camera
-    ray leaves for the wall point: the camera is focused on the wall.
+    ray leaves for the wall point: the camera is focused on the wall. The view is in its own frame
+    (`core.view_frame`). Raises SettingError for one that is not.
     """
+    eye = scene.views[view]
+    if eye.wall != "y_max" or eye.light is not None:
+        raise SettingError(
+            f"View {eye.name!r} looks at {eye.wall} or by a light of its own; rays are traced to y_max and by the "
+            "scene's light alone here. Take data_term = 'displacement', or the preset draft or standard."
+        )
     with jax.enable_x64(True):
         return _batch(
             scene.room,

@@ -19,6 +19,7 @@ from core.render.pixel_geometry import PixelGeometry, pixel_geometry
 from core.render.render_choice import RenderChoice, choose
 from core.render.shift import pattern_offset_px, wall_offset_m
 from core.scene import Scene
+from core.view_frame import Turn, facing, field_facing, turn_of
 
 
 class Exposure(eqx.Module):
@@ -56,6 +57,7 @@ class PixelRenderer(eqx.Module):
     exposure: Exposure
     rays: tuple[tuple[PixelGeometry, ...], ...]
     choice: RenderChoice
+    turn: Turn = eqx.field(static=True)
 
     def reference(self) -> Float[Array, " pixels"]:
         """Luminance through air at rest."""
@@ -63,6 +65,7 @@ class PixelRenderer(eqx.Module):
 
     def flow(self, field: AbstractField) -> Float[Array, " pixels"]:
         """Luminance through a flow; differentiable in the field."""
+        field = field_facing(field, self.turn)
         total = jnp.zeros_like(self.exposure.geometry.weight)
         for bundle in self.rays:
             motions = [pattern_motion(geometry, field, self.choice) for geometry in bundle]
@@ -94,7 +97,9 @@ def pixel_renderer(
     The pixel integral is a Gauss quadrature of the triangle filter, or, with a seed, Monte Carlo with common
     random numbers. Where a pixel covers a good part of a cell of the field, every sample traces its own ray.
     """
-    choice = choose(scene, view, field)
+    turn = turn_of(scene, view)
+    scene, view = facing(scene, view)
+    choice = choose(scene, view, None if field is None else field_facing(field, turn))
     offsets, weights = _samples(scene, view, pixels, choice.samples, monte_carlo_seed)
     exposure = Exposure(pixel_geometry(scene, view, pixels), jnp.asarray(offsets), jnp.asarray(weights))
     own = [np.zeros((1, 2))] if choice.stride else list(offsets)
@@ -102,7 +107,7 @@ def pixel_renderer(
         tuple(pixel_geometry(scene, view, pixels + offset, point) for offset in own)
         for point in lens_points(choice)
     )
-    return PixelRenderer(jnp.asarray(pattern_image(scene)), exposure, rays, choice)
+    return PixelRenderer(jnp.asarray(pattern_image(scene)), exposure, rays, choice, turn)
 
 
 def lens_points(choice: RenderChoice) -> list[tuple[float, float]]:

@@ -5,14 +5,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from core.data_error import WALL_MARGIN
 from core.known_temperature import VertexGrid
 from core.problem import Problem
 from core.rays.operator import StraightRayOperator, build
+from core.rays.visibility import away_from_walls
 from core.result import Solution
 from core.scene import Scene
 from core.solve.check import check_problem
 from core.solve.draft.temperature import solve_temperature
 from core.solve.draft.temperature_prior import TemperatureSettings
+from core.view_frame import looked_along
 from core.watch import Watch
 
 _apply = jax.jit(lambda operator, values: operator.apply(values))
@@ -43,12 +46,14 @@ def _widened(leaf: Array) -> Array:
 
 
 def draft_grid(scene: Scene) -> VertexGrid:
-    """48 cells along the room's longest side; along the view, where images see nothing, a third as many."""
+    """48 cells along the room's longest side; along an axis that all views look along, a third as many."""
     size = scene.room.size_m
     longest = 48 if scene.solve.grid == "auto" else scene.solve.grid
     spacing = max(size) / longest
     counts = [int(np.clip(round(s / spacing), 8, longest)) + 1 for s in size]
-    counts[1] = max(9, (counts[1] + 2) // 3)
+    unseen = looked_along(scene)
+    if len(unseen) == 1:
+        counts[unseen[0]] = max(9, (counts[unseen[0]] + 2) // 3)
     return VertexGrid(scene.room, (counts[0], counts[1], counts[2]))
 
 
@@ -60,9 +65,25 @@ def solve_draft(
     Raises SettingError, StoppedError.
     """
     check_problem(problem, "bos+boundary")
+    problem = _past_layers(problem)
     grid = draft_grid(problem.scene)
     operators = tuple(
         _OnTheDevice(build(problem.scene, view, shift.centres_px, grid.shape, float(shift.window_px)))
         for view, shift in enumerate(problem.shifts)
     )
     return solve_temperature(problem, operators, grid, settings, watch)
+
+
+def _past_layers(problem: Problem) -> Problem:
+    """The problem without windows beside walls, where views look along several axes.
+
+    A wall's thermal layer is thinner than a cell. A view along the wall sees it in those windows, and where another
+    view looks at the wall nothing else can take it up: it would be spread over the room.
+    """
+    if len(looked_along(problem.scene)) < 2:
+        return problem
+    shifts = tuple(
+        shift.at(away_from_walls(problem.scene, view, shift.centres_px, WALL_MARGIN))
+        for view, shift in enumerate(problem.shifts)
+    )
+    return Problem(problem.scene, shifts, problem.planes, problem.sensors, problem.images)

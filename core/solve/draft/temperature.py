@@ -24,6 +24,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from core.air import Air
 from core.drift import nearly_still
+from core.geometry import face_of
 from core.known_temperature import VertexGrid, known_temperature
 from core.problem import Problem, ShiftMeasurement
 from core.result import Outcome, Solution
@@ -50,6 +51,7 @@ from core.solve.draft.temperature_system import (
     steepest_slopes,
     without_drift,
 )
+from core.view_frame import looked_along
 from core.watch import Row, Watch
 
 # Thinner air than at this temperature is none: without a limit 0 K comes next, and then less.
@@ -143,14 +145,15 @@ def _system(
     rays = operators
     still = [without_drift(*of) for of in zip(rays, problem.shifts, weights, strict=True)]
     operators, shifts = tuple(operator for operator, _ in still), tuple(shift for _, shift in still)
-    size = prior_size(operators, weights, shifts, prior, grid, settings)
+    lengths = lengths_m(grid, settings, looked_along(problem.scene))
+    size = prior_size(operators, weights, shifts, prior, grid, lengths)
     # A room's worth of independent values: one a hundred vertices.
     mass = 0.01 / size**2
-    lengths = lengths_m(grid, settings)
     stiff = [mass * (length / h) ** 2 for length, h in zip(lengths, grid.spacing_m, strict=True)]
     system = System(
         grid,
         operators,
+        tuple(face_of(view.wall).axis for view in problem.scene.views[: len(operators)]),
         rays,
         weights,
         known,

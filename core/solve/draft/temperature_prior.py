@@ -106,15 +106,15 @@ def profile_range_k(problem: Problem) -> float:
 
 def prior_size(
     operators: tuple[ShiftOperator, ...],
-    weights: tuple[Float[np.ndarray, "windows 2 2"], ...],
+    weights: tuple[Float[np.ndarray, "_ 2 2"], ...],
     shifts: tuple[ShiftMeasurement, ...],
     prior: Volume,
     grid: VertexGrid,
-    settings: TemperatureSettings,
+    lengths: tuple[float, float, float],
 ) -> float:
     """Rms of n - prior at which smooth random fields move the pattern as far as it moved beyond its noise."""
     random = np.random.default_rng(0)
-    sigma = [length / h for length, h in zip(lengths_m(grid, settings), grid.spacing_m, strict=True)]
+    sigma = [length / h for length, h in zip(lengths, grid.spacing_m, strict=True)]
     unit, seen, noise = 0.0, 0.0, 0.0
     draws = [
         gaussian_filter(random.standard_normal(grid.shape), sigma, mode="reflect") for _ in range(_DRAWS)
@@ -138,10 +138,13 @@ def _most(shifts_px: Float[np.ndarray, "windows 2"]) -> float:
     return float(squares[squares <= np.percentile(squares, 90)].sum()) if len(squares) else 0.0
 
 
-def lengths_m(grid: VertexGrid, settings: TemperatureSettings) -> tuple[float, float, float]:
-    """Correlation lengths of n' along x, y, z [m]."""
+def lengths_m(
+    grid: VertexGrid, settings: TemperatureSettings, looked_along: tuple[int, ...]
+) -> tuple[float, float, float]:
+    """Correlation lengths of n' along x, y, z [m]: long where all views look along the axis, and none across it."""
     longest_m = max(grid.box.size_m)
-    return settings.across * longest_m, settings.along * longest_m, settings.across * longest_m
+    shares = [settings.along if looked_along == (axis,) else settings.across for axis in range(3)]
+    return shares[0] * longest_m, shares[1] * longest_m, shares[2] * longest_m
 
 
 def excess(air: Air, excess_k: np.ndarray) -> np.ndarray:

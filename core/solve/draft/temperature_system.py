@@ -12,12 +12,16 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator
 
+from core.geometry import face_of
 from core.known_temperature import KnownTemperature, VertexGrid
 from core.motion import WithoutMotion, without_motion
 from core.problem import ShiftMeasurement
 from core.scene import Scene
+from core.view_frame import facing, looked_along, turn_to
 
 Volume = Float[np.ndarray, "nx ny nz"]
+# The steepest slopes of rays along an axis: against x, y and z.
+Slopes = dict[int, list[float]]
 
 
 @runtime_checkable
@@ -39,14 +43,16 @@ class System:
 
     grid: VertexGrid
     operators: tuple[ShiftOperator, ...]
+    # The axis of the room that each looks along.
+    looks_along: tuple[int, ...]
     # The same before the camera's motion is taken out, which the preconditioner does not know.
     rays: tuple[ShiftOperator, ...]
-    weights: tuple[Float[np.ndarray, "windows 2 2"], ...]
+    weights: tuple[Float[np.ndarray, "_ 2 2"], ...]
     known: KnownTemperature
     per_k: float
     stiffness: tuple[float, float, float]
     mass: float
-    slopes: tuple[float, float]
+    slopes: Slopes
     # Where no plane gives the profile over height: how much a step of it from one level to the next weighs.
     profile: float | None
 
@@ -112,16 +118,17 @@ def without_drift(
 
 
 def preconditioner(system: System) -> LinearOperator:
-    """Inverse of a separable stand-in: eigenvectors along x and z, a dense system along the view y.
+    """Inverse of a separable stand-in: eigenvectors along x and z, a dense system along y.
 
-    The stand-in is data = (Lx / hx^2 + Lz / hz^2) (x) W, with the levers W of the slabs measured on the
-    operators themselves. Rays of a perspective view cross a wave at other phases from slab to slab, by up
-    to their slope: the mean over the slopes makes a sinc of W's off-diagonals. Known planes pin their wall.
+    The stand-in of views along y is data = (Lx / hx^2 + Lz / hz^2) (x) W, with the levers W of the slabs measured on
+    the operators themselves. Rays of a perspective view cross a wave at other phases from slab to slab, by up
+    to their slope: the mean over the slopes makes a sinc of W's off-diagonals. Of views along x or z only the
+    diagonal of W in the modes counts. Known planes pin their wall.
     """
     shape, spacing = system.grid.shape, system.grid.spacing_m
     fx, fy, fz = system.stiffness
     (lx, qx, dx), (lz, qz, dz) = (_modes(system, axis) for axis in (0, 2))
-    levers = _slab_levers(system)
+    levers = _slab_levers(system, 1)
     smooth = fx * lx[:, None] + fz * lz[None]
     across = dx[:, None] / spacing[0] ** 2 + dz[None] / spacing[2] ** 2
     matrices = (
@@ -130,6 +137,12 @@ def preconditioner(system: System) -> LinearOperator:
         + fy * _laplacian(shape[1])
         + across[..., None, None] * levers * _coherence(system)
     )
+    for axis in {0, 2} & set(system.looks_along):
+        beside = 2 - axis
+        curvature = (dx[:, None], dz[None])[beside // 2] / spacing[beside] ** 2
+        seen = _levers_of_modes(system, axis, qx if axis == 0 else qz)
+        matrices += (seen * curvature)[..., None, None] * np.eye(shape[1])
+        matrices += seen[..., None, None] * _laplacian(shape[1]) / spacing[1] ** 2
     if system.profile is not None:
         # The first mode along x, where it is even along y, is the profile.
         weights = system.profile / (shape[0] * shape[1]) * lz - smooth[0] - system.mass
@@ -169,28 +182,42 @@ def _mean_mass(system: System) -> float:
 
 
 def _coherence(system: System) -> Float[np.ndarray, "nx nz ny ny"]:
-    """Mean over the view's slopes of the phase between two slabs, for each pair of waves along x and z."""
-    y_m = system.grid.axes_m[1]
-    apart_m = y_m[:, None] - y_m[None]
-    factors = []
-    for axis in (0, 2):
-        waves_per_m = np.arange(system.grid.shape[axis]) / (2 * system.grid.box.size_m[axis])
-        factors.append(np.sinc(2 * waves_per_m[:, None, None] * system.slopes[axis // 2] * apart_m))
-    return factors[0][:, None] * factors[1][None]
+    """Mean over the slopes of views along y of the phase between two slabs, for each pair of waves along x and z."""
+    along_x, along_z = (_phases(system, 1, axis) for axis in (0, 2))
+    return along_x[:, None] * along_z[None]
 
 
-def steepest_slopes(scene: Scene) -> tuple[float, float]:
-    """Largest slope of a camera ray against the view's axis y that meets the back wall, along x and z."""
-    room = scene.room
-    slopes = []
-    for axis in (0, 2):
-        reach = [
-            abs(end - view.camera.position_m[axis]) / (room.upper_m[1] - view.camera.position_m[1])
-            for view in scene.views
-            for end in (room.lower_m[axis], room.upper_m[axis])
-        ]
-        slopes.append(max(reach))
-    return slopes[0], slopes[1]
+def _phases(system: System, along: int, across: int) -> Float[np.ndarray, "waves n n"]:
+    """Mean over the slopes of views along one axis of the phase between two slabs, for each wave along another."""
+    places_m = system.grid.axes_m[along]
+    apart_m = places_m[:, None] - places_m[None]
+    waves_per_m = np.arange(system.grid.shape[across]) / (2 * system.grid.box.size_m[across])
+    slope = system.slopes[along][across] if along in system.slopes else 0.0
+    return np.sinc(2 * waves_per_m[:, None, None] * slope * apart_m)
+
+
+def _levers_of_modes(
+    system: System, axis: int, vectors: Float[np.ndarray, "n n"]
+) -> Float[np.ndarray, "nx nz"]:
+    """What views along x (or z) weigh on each mode along it, for each wave along the other of the two."""
+    levers = _slab_levers(system, axis) * _phases(system, axis, 2 - axis)
+    weights = np.einsum("ai,wab,bi->iw", vectors, levers, vectors, optimize=True)
+    return weights if axis == 0 else weights.T
+
+
+def steepest_slopes(scene: Scene) -> Slopes:
+    """Largest slope of a camera ray that meets its wall, by the axis that it looks along and the one across."""
+    steepest = {axis: [0.0, 0.0, 0.0] for axis in looked_along(scene)}
+    for number, view in enumerate(scene.views):
+        turn, along = turn_to(view.wall), face_of(view.wall).axis
+        own, place = facing(scene, number)
+        camera_m, room = own.views[place].camera.position_m, own.room
+        for axis in (0, 2):
+            for end in (room.lower_m[axis], room.upper_m[axis]):
+                slope = abs(end - camera_m[axis]) / (room.upper_m[1] - camera_m[1])
+                of = steepest[along]
+                of[turn.axes[axis]] = max(of[turn.axes[axis]], slope)
+    return steepest
 
 
 def _laplacian(n: int) -> Float[np.ndarray, "n n"]:
@@ -220,16 +247,21 @@ def _modes(
     return values, vectors, np.einsum("ai,ab,bi->i", vectors, laplacian, vectors)
 
 
-def _slab_levers(system: System) -> Float[np.ndarray, "ny ny"]:
-    """Hessian of the data for a unit gradient across the view, slab by slab along y, a vertex of the face."""
+def _slab_levers(system: System, axis: int) -> Float[np.ndarray, "n n"]:
+    """Hessian of the data of views along an axis for a unit gradient across it, slab by slab, a vertex."""
     shape, spacing = system.grid.shape, system.grid.spacing_m
-    total = np.zeros((shape[1], shape[1]))
-    for operator, weight in zip(system.rays, system.weights, strict=True):
+    count, rising = shape[axis], 1 if axis == 0 else 0
+    total = np.zeros((count, count))
+    ramp = np.moveaxis(np.arange(shape[rising]) * spacing[rising] * np.ones((1, 1, 1)), 2, rising)
+    for along, operator, weight in zip(system.looks_along, system.rays, system.weights, strict=True):
+        if along != axis:
+            continue
         shifts = []
-        for j in range(shape[1]):
-            ramp = np.zeros(shape)
-            ramp[:, j, :] = (np.arange(shape[0]) * spacing[0])[:, None]
-            shifts.append(operator.apply(ramp))
+        for j in range(count):
+            slab = np.zeros(shape)
+            here = tuple(slice(j, j + 1) if a == axis else slice(None) for a in range(3))
+            slab[here] = ramp
+            shifts.append(operator.apply(slab))
         stacked = np.stack(shifts)
         total += np.einsum("iwa,wab,jwb->ij", stacked, weight, stacked, optimize=True)
-    return total / (shape[0] * shape[2])
+    return total / (np.prod(shape) / count)

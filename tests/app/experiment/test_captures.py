@@ -54,7 +54,7 @@ def test_the_raw_stack_holds_every_frame_that_is_in_the_mean(tmp_path):
     plan = CapturePlan(frames=5, raw_stack=True)
     recorder = CaptureRecorder(tmp_path / "raw", plan)
     burst = run_capture(make_camera(), plan, on_frame=recorder.observe)
-    recorder.keep(burst)
+    recorder.keep([burst])
 
     frames, records = read_raw_stack(tmp_path / "raw" / "frames.tif")
 
@@ -66,7 +66,7 @@ def test_a_lost_camera_leaves_a_readable_capture_that_is_no_measurement(tmp_path
     plan = CapturePlan(frames=40)
     recorder = CaptureRecorder(tmp_path / "lost", plan)
     camera = make_camera(faults={20: CameraFault.UNPLUG}.get)
-    recorder.keep(run_capture(camera, plan, on_frame=recorder.observe))
+    recorder.keep([run_capture(camera, plan, on_frame=recorder.observe)])
 
     capture = load_capture(tmp_path / "lost")
 

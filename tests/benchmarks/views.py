@@ -1,0 +1,81 @@
+"""What a second and a third view add: one room, seen at y_max alone, with x_max too, with the ceiling too.
+
+Each is an experiment of its own, simulated, reconstructed and scored by the product's functions. One JSON line a set
+of views: the errors of T and u, how many points the 95 % intervals hold, and the seconds.
+
+    python -m tests.benchmarks.views TRUTH.npz [--camera-px 1024] [--frames 60] [--preset draft] [--rig lab] [--seed 0]
+"""
+
+import argparse
+import json
+import tempfile
+from pathlib import Path
+
+from app.experiment.rig_settings import SimulatedCameraSettings
+from app.pipeline import reconstruct
+from app.simulate.experiment import simulate
+from app.volume.scene import RIG_PLACES, RigOptions
+from app.volume.score import score_experiment
+from core.geometry import WallName
+
+SETS: tuple[tuple[WallName, ...], ...] = (
+    ("y_max",),
+    ("x_max",),
+    ("y_max", "x_max"),
+    ("y_max", "x_max", "z_max"),
+)
+
+
+def main() -> None:
+    """Print the lines."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("truth", type=Path)
+    parser.add_argument("--camera-px", type=int, default=1024)
+    parser.add_argument("--frames", type=int, default=60)
+    parser.add_argument("--preset", default="draft")
+    parser.add_argument("--information", default="operator")
+    parser.add_argument("--rig", default="lab", choices=RIG_PLACES)
+    parser.add_argument("--seed", type=int, default=0)
+    asked = parser.parse_args()
+    stand_off_m, baseline_m = RIG_PLACES[asked.rig]
+    for walls in SETS:
+        options = RigOptions(
+            camera_px=(asked.camera_px, asked.camera_px * 3 // 4),
+            frames=asked.frames,
+            stand_off_m=stand_off_m,
+            baseline_m=baseline_m,
+            pattern_seed=asked.seed,
+            walls=walls,
+        )
+        with tempfile.TemporaryDirectory() as made:
+            folder = Path(made) / "room"
+            camera = SimulatedCameraSettings(seed=asked.seed)
+            simulate(asked.truth, folder, options, asked.information, camera)
+            done = reconstruct(folder, asked.preset)
+            scores = score_experiment(folder, asked.truth)
+        print(
+            json.dumps(
+                {
+                    "room": asked.truth.stem,
+                    "views": walls,
+                    "preset": asked.preset,
+                    "information": asked.information,
+                    "rig": asked.rig,
+                    "camera_px": asked.camera_px,
+                    "frames": asked.frames,
+                    "seed": asked.seed,
+                    "T_rms_K": scores["T"]["rms_K"],
+                    "T_departure": scores["T"]["rel_departure"],
+                    "T_within": scores["T_within"],
+                    "u": None if scores["u"] is None else scores["u"]["rel"],
+                    "u_within": scores["u_within"],
+                    "solver_s": round(scores["solver_s"], 1),
+                    "wall_s": round(done.wall_s, 1),
+                }
+            ),
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
