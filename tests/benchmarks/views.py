@@ -3,7 +3,7 @@
 Each is an experiment of its own, simulated, reconstructed and scored by the product's functions. One JSON line a set
 of views: the errors of T and u, how many points the 95 % intervals hold, and the seconds.
 
-    python -m tests.benchmarks.views TRUTH.npz [--camera-px 1024] [--frames 60] [--preset draft] [--rig lab] [--seed 0]
+    python -m tests.benchmarks.views TRUTH.npz [--camera-px 1024] [--frames 60] [--preset draft] [--seed 0]
 """
 
 import argparse
