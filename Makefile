@@ -19,8 +19,9 @@ setup: .venv/.installed
 demo: setup
 	$(BIN)/airlens demo
 
+# One worker more than cores: tests wait for browsers, devices and other processes a quarter of their time.
 test: setup chromium
-	$(BIN)/python -m pytest -n $(CORES) --dist loadscope
+	$(BIN)/python -m pytest -n $$(($(CORES) + 1)) --dist loadscope
 
 # Debian's browser for the tests of the page; where it cannot be installed they are skipped and say so.
 chromium:

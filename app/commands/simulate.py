@@ -121,8 +121,8 @@ def parse_walls(text: str) -> "tuple[WallName, ...]":
     from app.errors import BadInputError
     from core.geometry import WALLS
 
-    short: dict[str, WallName] = {"x": "x_max", "y": "y_max", "z": "z_max"}
-    known = short | {wall: wall for wall in WALLS}
+    known: dict[str, WallName] = {"x": "x_max", "y": "y_max", "z": "z_max"}
+    known.update((wall, wall) for wall in WALLS)
     names = [part.strip() for part in text.split(",")]
     if not set(names) <= set(known):
         raise BadInputError(
