@@ -8,7 +8,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter, ValidationError
 
 from app.errors import BadInputError
-from core.geometry import Vector2
+from core.geometry import Vector2, WallName
 from core.objects import RoomObject
 
 # What is known of its depth: its foot is seen; it stands no farther away; nothing.
@@ -19,7 +19,8 @@ Depth = Literal["seen", "at most", "unknown"]
 class Found:
     """A part of the wall that something hides, and the box that would hide it.
 
-    `share` is that of the view's wall; `x_m` and `z_m` are its bounds as seen on the wall. `outline_px` are its left,
+    `share` is that of the view's wall; `x_m` (y of a view of x_min or x_max) and `z_m` are its bounds as seen on the
+    wall. `outline_px` are its left,
     top, right and lower edge in the picture of view number `view`. `box` is a proposal that passes no heat.
     `solved`: the air was solved with it, its heat unknown.
     """
@@ -33,6 +34,7 @@ class Found:
     box: RoomObject
     solved: bool = False
     sentence: str = ""
+    wall: WallName = "y_max"
 
     @property
     def entry(self) -> str:

@@ -1,7 +1,7 @@
 """What stands before the wall and was not stated: covered windows that hang together, and the box that hides them."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import count
 
@@ -19,6 +19,7 @@ from core.geometry import Vector3
 from core.objects import RoomObject
 from core.rays.visibility import hidden_by_objects, sees_wall, wall_points
 from core.scene import Scene
+from core.view_frame import facing, turn_of
 
 # A thing is so many windows wide and tall: the middle one is then covered wholly, wherever its edges lie.
 _LEAST_WINDOWS = 3
@@ -77,22 +78,34 @@ def found_things(
 ) -> tuple[Found, ...]:
     """The things that hide the covered windows of a view, from left to right; specks and slivers are none.
 
-    Each has a name of its own, which is not among `taken` either.
+    Each has a name of its own, which is not among `taken` either. In a view of floor or ceiling nothing is placed.
     """
+    turn = turn_of(scene, view)
+    if turn.axes[2] != 2:
+        return ()
     regions = _regions(covered.reshape([n // window_px for n in reference.shape]), window_px)
     if not regions:
         return ()
     centres = window_centres(reference.shape, window_px)
     on_wall = int(sees_wall(scene, view, centres, 0.5 * window_px).sum())
-    wall = _Wall(scene, view, reference, window_px, on_wall)
+    wall = _Wall(*facing(scene, view), reference, window_px, on_wall)
     free = wall.free_columns(regions)
     names = _names({*(item.name for item in scene.objects), *taken})
     things, room = [], scene
     for region, name in zip(regions, names, strict=False):
         found, on_floor = _found(wall, region, free, name)
+        found = _in_room(found, scene, view)
         things.append(told(room, found, on_floor))
         room = with_found(room, found.box) if things[-1].solved else room
     return tuple(things)
+
+
+def _in_room(found: Found, scene: Scene, view: int) -> Found:
+    """What was found in a view's own frame, along the room's axes."""
+    turn = turn_of(scene, view)
+    low, high = sorted(turn.signs[0] * x_m for x_m in found.x_m)
+    box = turn.back().thing(found.box)
+    return replace(found, view=view, x_m=(low, high), box=box, wall=scene.views[view].wall)
 
 
 def _regions(covered: Bool[np.ndarray, "rows columns"], window_px: int) -> list[_Region]:

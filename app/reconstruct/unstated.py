@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from app.experiment.found import Found
+from core.geometry import face_of
 from core.objects import RoomObject
 from core.problem import ShiftMeasurement
 from core.rays.visibility import sees_wall
@@ -38,6 +39,7 @@ def past_objects(scene: Scene, shifts: Sequence[ShiftMeasurement]) -> list[Shift
 def told(scene: Scene, found: Found, on_floor: bool) -> Found:
     """The thing with its sentence: what was found, where, and the entry that states it."""
     (x0, x1), (z0, z1), box = found.x_m, found.z_m, found.box
+    across = face_of(found.wall).along[0]
     shaded, refused = isinstance(scene.light, ProjectedPattern), ""
     solved = found.depth == "seen" and not shaded
     try:
@@ -45,8 +47,9 @@ def told(scene: Scene, found: Found, on_floor: bool) -> Found:
     except SettingError as error:
         solved, refused = False, f" As it is proposed it would be refused: {error}"
     sentence = (
-        f"Something that the scene does not state hides {100 * found.share:.1f} % of the wall, x {x0:.2f} to "
-        f"{x1:.2f} m, z {z0:.2f} to {z1:.2f} m as seen on it. {_place(found, on_floor)} it is {box.size_m[0]:.2f} m "
+        f"Something that the scene does not state hides {100 * found.share:.1f} % of the wall, "
+        f"{'xyz'[across]} {x0:.2f} to {x1:.2f} m, z {z0:.2f} to {z1:.2f} m as seen on it. "
+        f"{_place(found, on_floor)} it is {box.size_m[across]:.2f} m "
         f"wide and {box.size_m[2]:.2f} m high; how deep it is cannot be seen. {_SHADOW if shaded else ''}"
         f"{_use(solved)} State it in experiment.toml: {' '.join(found.entry.split())}; and the heat that it gives, "
         f'if any (a person: thermal = "power", power_w = 75).{refused}'
@@ -55,11 +58,15 @@ def told(scene: Scene, found: Found, on_floor: bool) -> Found:
 
 
 def _place(found: Found, on_floor: bool) -> str:
-    y_m = found.box.lower_m[1]
+    face = face_of(found.wall)
+    nearest_m = (found.box.lower_m if face.upper else found.box.upper_m)[face.axis]
+    at = f"{'xyz'[face.axis]} = {nearest_m:.2f} m"
     if found.depth == "seen":
-        return f"Its foot is seen: it stands at y = {y_m:.2f} m, where"
+        return f"Its foot is seen: it stands at {at}, where"
     if found.depth == "at most":
-        return f"Its foot is below the picture: it stands at y = {y_m:.2f} m or nearer to the camera; at {y_m:.2f} m"
+        return (
+            f"Its foot is below the picture: it stands at {at} or nearer to the camera; at {nearest_m:.2f} m"
+        )
     if on_floor:
         return "Its foot is not seen, so how far before the wall it stands is not known; at the wall"
     return "It does not reach the floor, and how far before the wall it is cannot be seen; at the wall"

@@ -18,7 +18,7 @@ from app.files.toml import to_plain
 from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.file import read_volume
 from core.objects import RoomObject
-from core.result import Outcome, Solution
+from core.result import Departures, Outcome, Solution
 from tests.browser.conftest import Opens, Station, snapshot
 
 PAINTED = re.compile(r"\d+")
@@ -240,6 +240,47 @@ def test_what_was_found_goes_to_the_rooms_editor_by_one_click(station: Station, 
     page.get_by_label("Experiment").select_option(without)
     expect(page.locator("pre")).to_contain_text("[[scene.objects]]")
     expect(page.get_by_role("button", name="Add what stands here")).to_have_count(0)
+    assert watched.complaints == []
+
+
+def test_a_sequence_is_looked_at_moment_by_moment(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=64).experiment
+    mean = room()
+    x, y, z = np.meshgrid(mean.x_m, mean.y_m, mean.z_m, indexing="ij")
+    places_m = np.linspace(mean.x_m[4], mean.x_m[-5], 4)
+    puffs_k = [2.0 * np.exp(-((x - at) ** 2 + y**2 + (z - 1.0) ** 2) / 0.1) for at in places_m]
+    bursts = Departures(
+        time_s=6.0 * np.arange(4),
+        temperature_k=np.stack(puffs_k).astype(np.float32),
+        temperature_std_k=np.full(x.shape, 0.1, np.float32),
+        field_std_k=0.2,
+        field_length_m=0.3,
+    )
+    moving = dataclasses.replace(mean, departures=bursts)
+    keep(station.app.state.services.folders.open(name), "20260101T000000-standard", moving, "standard", 1.0)
+    watched = opens(station.address)
+    page = watched.page
+    page.get_by_role("button", name="Look", exact=True).click()
+    expect(page.locator("main")).to_contain_text("This result is the mean of 4 bursts.")
+    slices = page.locator(".slice canvas")
+    expect(slices.first).to_have_attribute("data-painted", PAINTED)
+    page.get_by_role("button", name="Difference to the mean").click()
+    moment = page.get_by_role("slider", name="Moment")
+    expect(moment).to_have_value("0")
+    expect(page.locator("main")).to_contain_text("0 s of 18 s")
+    # The puff stands further along x in each burst: no two pictures are alike.
+    pictures = {slices.first.screenshot()}
+    for burst in (1, 2, 3):
+        moment.fill(str(burst))
+        expect(moment).to_have_attribute("aria-valuetext", f"{6 * burst} s")
+        pictures.add(another(slices.first, pictures))
+    assert len(pictures) == 4
+    snapshot(page, "look-sequence")
+    page.get_by_role("button", name="The temperature itself").click()
+    page.get_by_role("button", name="Play").click()
+    expect(moment).not_to_have_value("3")
+    page.get_by_role("button", name="Pause").click()
     assert watched.complaints == []
 
 

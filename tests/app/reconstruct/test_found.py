@@ -19,6 +19,7 @@ from core.objects import RoomObject
 from core.rays.visibility import hidden_by_objects, sees_wall
 from core.render import render_reference
 from core.scene import FixedTexture, ProjectedPattern, Scene, SolveModel, View, WaveletPattern
+from core.view_frame import turn_to
 
 WINDOW_PX = 8
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(4.0, 3.0, 2.6))
@@ -93,6 +94,25 @@ def test_a_person_whose_foot_is_seen_stands_where_it_stands(world):
     np.testing.assert_allclose(one.box.lower_m, PERSON.lower_m, atol=0.08)
     np.testing.assert_allclose(one.box.upper_m, PERSON.upper_m, atol=0.16)
     assert overlap(one.box, PERSON) > 0.8
+
+
+def test_before_a_side_wall_a_thing_is_found_along_the_rooms_axes():
+    scene, picture = room((DESK,)), seen(room((DESK,)), (PERSON, DESK))
+    _, (ahead,) = found(scene, picture)
+    # The same room and picture, turned so that what was y_max is x_min.
+    back = turn_to("x_min").back()
+    view = replace(scene.views[0], wall="x_min", camera=back.optics(CAMERA))
+    aside = replace(scene, room=back.box(ROOM), views=(view,), objects=(back.thing(DESK),))
+    _, (one,) = found(aside, picture)
+
+    stands = back.thing(ahead.box)
+    np.testing.assert_allclose(one.box.lower_m, stands.lower_m, atol=1e-6)
+    np.testing.assert_allclose(one.box.upper_m, stands.upper_m, atol=1e-6)
+    assert (one.solved, one.view, one.wall) == (True, 0, "x_min")
+    low, high = one.x_m
+    assert stands.lower_m[1] - 0.5 < low < high < stands.upper_m[1] + 0.5
+    assert f"y {low:.2f} to {high:.2f} m" in one.sentence
+    assert f"it stands at x = {stands.upper_m[0]:.2f} m" in one.sentence
 
 
 def test_the_foot_below_the_picture_is_told():
