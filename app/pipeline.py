@@ -94,7 +94,7 @@ def reconstruct(
     if sequence:
         check_sequence(captures)
     on_stage("measure the shift of the pattern", "measure")
-    measurement = measure(captures, known.scene)
+    measurement = measure(captures, known.scene, watch)
     # With what was found to stand in the room.
     standing = replace(known, scene=measurement.scene)
     problem = problem_of(standing, measurement.shifts, measurement.images)

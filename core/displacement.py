@@ -28,7 +28,7 @@ REACH_PX = 8
 _LOST = 0.1
 # A refused window leaves so many times the rms of the picture's median window,
 _UNLIKE = 3.0
-# or its pattern is so much fainter or brighter than the median window's.
+# or its pattern is so much fainter or brighter than in the reference. A lamp does not change by as much.
 _FAINT = 2.0
 
 
@@ -111,11 +111,18 @@ def _lost(fit: WindowFit) -> Bool[np.ndarray, " windows"]:
 
 
 def _unlike(fit: WindowFit) -> Bool[np.ndarray, " windows"]:
-    """Windows that show something else than the pattern, moved: by what they leave, or by how faint it is."""
+    """Windows that show something else than the pattern, moved.
+
+    They have lost the pattern, or leave more than the median of those that have not. Where most windows leave much
+    of the pattern, these have lost it too: the median is no pattern then.
+    """
+    gain = (fit.gain > 1 / _FAINT) & (fit.gain < _FAINT)
+    gone = ~gain & (fit.information_per_px2.trace(axis1=1, axis2=2) > 1.0)
+    if (gone | _lost(fit)).mean() > 0.5:
+        gone |= _lost(fit)
+    others = ~gone if not gone.all() else gone
     left = np.maximum(fit.chi_squared, 1.0)
-    gain = fit.gain / np.median(fit.gain)
-    faint = ~((gain > 1 / _FAINT) & (gain < _FAINT)) & (fit.information_per_px2.trace(axis1=1, axis2=2) > 1.0)
-    return (left > _UNLIKE**2 * np.median(left)) | faint
+    return gone | (left > _UNLIKE**2 * np.median(left[others]))
 
 
 def _replaced(fit: WindowFit, where: Bool[np.ndarray, " windows"], new: WindowFit) -> WindowFit:

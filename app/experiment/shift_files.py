@@ -1,5 +1,6 @@
-"""The measured shifts of a result on disk: shift-<view>.nc, for the report, the page, and other programs."""
+"""Measured shifts as NetCDF: shift-<view>.nc of a result, for the report, the page, and other programs."""
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,28 +18,60 @@ from core.problem import ShiftMeasurement
 def write_shifts(folder: Path, shifts: tuple[ShiftMeasurement, ...]) -> None:
     """Write one NetCDF a view: centres, displacement, information."""
     for index, shift in enumerate(shifts):
-        pixel, component = {"units": "pixel"}, ("window", "component")
-        dataset = xr.Dataset(
-            {
-                "centre": (component, shift.centres_px, pixel | {"long_name": "window centre"}),
-                "displacement": (
-                    component,
-                    shift.displacement_px,
-                    pixel | {"long_name": "displacement of the pattern, to the right and down"},
-                ),
-                "information": (
-                    ("window", "component", "other"),
-                    shift.information_per_px2,
-                    {"units": "pixel-2", "long_name": "inverse covariance of the displacement"},
-                ),
-            },
-            attrs={"Conventions": "CF-1.11", "window_px": shift.window_px} | _motion_attributes(shift.motion),
-        )
-        if shift.short_mean_px is not None:
-            about = {"long_name": "errors of one standard deviation of a mean over a short time"}
-            dataset["short_mean"] = (("window", "component", "error"), shift.short_mean_px, pixel | about)
         with durable_path(folder / f"shift-{index}.nc") as temporary:
-            dataset.to_netcdf(temporary, engine="h5netcdf")
+            _dataset(shift).to_netcdf(temporary, engine="h5netcdf")
+
+
+def as_bytes(shift: ShiftMeasurement) -> bytes:
+    """One view's shifts, as `write_shifts` writes them."""
+    buffer = io.BytesIO()
+    _dataset(shift).to_netcdf(buffer, engine="h5netcdf")
+    return buffer.getvalue()
+
+
+def of_bytes(content: bytes) -> ShiftMeasurement:
+    """What `as_bytes` made."""
+    with xr.open_dataset(io.BytesIO(content), engine="h5netcdf") as dataset:
+        return _shift(dataset.load())
+
+
+def _dataset(shift: ShiftMeasurement) -> xr.Dataset:
+    pixel, component = {"units": "pixel"}, ("window", "component")
+    dataset = xr.Dataset(
+        {
+            "centre": (component, shift.centres_px, pixel | {"long_name": "window centre"}),
+            "displacement": (
+                component,
+                shift.displacement_px,
+                pixel | {"long_name": "displacement of the pattern, to the right and down"},
+            ),
+            "information": (
+                ("window", "component", "other"),
+                shift.information_per_px2,
+                {"units": "pixel-2", "long_name": "inverse covariance of the displacement"},
+            ),
+        },
+        attrs={"Conventions": "CF-1.11", "window_px": shift.window_px} | _motion_attributes(shift.motion),
+    )
+    if shift.short_mean_px is not None:
+        about = {"long_name": "errors of one standard deviation of a mean over a short time"}
+        dataset["short_mean"] = (("window", "component", "error"), shift.short_mean_px, pixel | about)
+    if shift.refused is not None:
+        about = {"long_name": "1 where a window shows something else than the pattern, moved"}
+        dataset["refused"] = ("window", shift.refused.astype(np.int8), about)
+    return dataset
+
+
+def _shift(data: xr.Dataset) -> ShiftMeasurement:
+    return ShiftMeasurement(
+        centres_px=data["centre"].to_numpy(),
+        displacement_px=data["displacement"].to_numpy(),
+        information_per_px2=data["information"].to_numpy(),
+        window_px=int(np.asarray(data.attrs["window_px"])),
+        refused=data["refused"].to_numpy().astype(bool) if "refused" in data else None,
+        motion=_motion(data.attrs),
+        short_mean_px=data["short_mean"].to_numpy() if "short_mean" in data else None,
+    )
 
 
 def _motion_attributes(motion: CameraMotion | None) -> dict[str, Any]:
@@ -62,16 +95,7 @@ def read_shifts(folder: Path) -> tuple[ShiftMeasurement, ...]:
         with reading(path, "Reconstruct again."):
             with xr.open_dataset(path, engine="h5netcdf") as dataset:
                 data = dataset.load()
-            shifts.append(
-                ShiftMeasurement(
-                    centres_px=data["centre"].to_numpy(),
-                    displacement_px=data["displacement"].to_numpy(),
-                    information_per_px2=data["information"].to_numpy(),
-                    window_px=int(np.asarray(data.attrs["window_px"])),
-                    motion=_motion(data.attrs),
-                    short_mean_px=data["short_mean"].to_numpy() if "short_mean" in data else None,
-                )
-            )
+            shifts.append(_shift(data))
     if not shifts:
         raise BadInputError(f"{folder} holds no measured shifts; reconstruct again.")
     return tuple(shifts)

@@ -1,14 +1,16 @@
 """From captures to shifts with their noise, the drift between the exposures taken out."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Bool, Float32
 from scipy.ndimage import uniform_filter
 
 from app.errors import BadInputError
-from app.experiment.captures import Capture, CapturePair, load_capture
+from app.experiment.captures import Capture, CapturePair
 from app.experiment.found import Found
+from app.reconstruct.bursts import burst_shifts, windows_among
 from app.reconstruct.drift import Agreement, Exposures, agreement, mount, without_known_drift
 from app.reconstruct.found import what_stands
 from app.reconstruct.pair import check_pair
@@ -20,6 +22,7 @@ from core.drift import Similarity, move_image
 from core.problem import ImagePair, ShiftMeasurement
 from core.rays.visibility import hidden_by_objects, sees_wall
 from core.scene import Scene, View
+from core.watch import Watch
 from core.window_fit import derivative_filter
 
 Image = Float32[np.ndarray, "rows cols"]
@@ -47,20 +50,24 @@ class Measurement:
     found: tuple[Found, ...] = ()
 
 
-def measure(captures: CapturePair, scene: Scene) -> Measurement:
-    """Measure every view of a reference and a flow. Raises BadInputError, SettingError."""
+def measure(captures: CapturePair, scene: Scene, watch: Watch = Watch()) -> Measurement:
+    """Measure every view of a reference and a flow. Raises BadInputError, SettingError, StoppedError.
+
+    What is measured of the bursts of a sequence is kept in `watch.store`, and taken from there.
+    """
     reference, flow = captures.reference, captures.flow
     _check_captures(reference, flow, scene)
     standing = what_stands(scene, [image.mean for image in reference.images])
     shifts, drifts, notes, views = [], [], [], []
     for index, view in enumerate(scene.views):
         shift, drift, note = _measure_view(scene, index, view, captures, standing.covered[index])
-        bursts = _burst_shifts(scene, index, captures, shift)
+        alone = _alone(scene, index, flow.images[index].mean, shift.window_px)
+        shift, bursts, left_out = burst_shifts(scene, index, captures, shift, alone, watch)
         shift, averaged = with_short_mean(shift, bursts, captures)
         views.append(bursts)
         shifts.append(shift)
         drifts.append(drift)
-        notes.append(note + averaged)
+        notes.append(note + left_out + averaged)
     images: tuple[ImagePair, ...] = ()
     if scene.solve.data_term == "warped":
         images = tuple(_pair(view, n, captures, drifts[n]) for n, view in enumerate(scene.views))
@@ -116,37 +123,27 @@ def _wall_and_beyond(scene: Scene, index: int, shape: tuple[int, int], window_px
     return in_room, beyond & _whole(centres, shape)
 
 
-def _burst_shifts(
-    scene: Scene, index: int, captures: CapturePair, shift: ShiftMeasurement
-) -> tuple[ShiftMeasurement, ...]:
-    """How the pattern moved from the mean of a sequence to each of its bursts, in the windows of `shift`.
+def _alone(scene: Scene, index: int, mean: Image, window_px: int) -> Callable[[Capture], ShiftMeasurement]:
+    """How the pattern moved from the mean picture of a sequence to one of its bursts.
 
-    Their information is that of the burst's own noise.
+    The information is that of the burst's own noise.
     """
-    mean, view = captures.flow.images[index].mean, scene.views[index]
-    in_room, beyond = _wall_and_beyond(scene, index, mean.shape, shift.window_px)
-    chosen = _among(window_centres(mean.shape, shift.window_px), shift.centres_px)
-    found = []
-    for folder in (burst.folder for burst in captures.bursts):
-        burst = load_capture(folder)
-        variance = uniform_filter(_variance(burst, index, view), 2 * shift.window_px)
-        exposures = Exposures(mean, burst.images[index].mean, variance, shift.window_px)
-        alone, _, _ = without_known_drift(exposures, in_room, beyond, mount(view.drift_std_px))
-        found.append(alone.at(chosen))
-    return tuple(found)
+    view = scene.views[index]
+    in_room, beyond = _wall_and_beyond(scene, index, mean.shape, window_px)
+
+    def measured(burst: Capture) -> ShiftMeasurement:
+        variance = uniform_filter(_variance(burst, index, view), 2 * window_px)
+        exposures = Exposures(mean, burst.images[index].mean, variance, window_px)
+        return without_known_drift(exposures, in_room, beyond, mount(view.drift_std_px))[0]
+
+    return measured
 
 
 def _in_windows(
     bursts: tuple[ShiftMeasurement, ...], shift: ShiftMeasurement
 ) -> tuple[ShiftMeasurement, ...]:
     """The bursts in the windows of `shift` alone."""
-    return tuple(burst.at(_among(burst.centres_px, shift.centres_px)) for burst in bursts)
-
-
-def _among(centres_px: Float[np.ndarray, "windows 2"], chosen_px: Float[np.ndarray, "some 2"]) -> Mask:
-    """Which windows are among the chosen; both are in the picture's order."""
-    chosen = {tuple(centre) for centre in chosen_px}
-    return np.array([tuple(centre) in chosen for centre in centres_px])
+    return tuple(burst.at(windows_among(burst.centres_px, shift.centres_px)) for burst in bursts)
 
 
 def between_references(captures: CapturePair, scene: Scene, index: int = 0) -> Agreement:

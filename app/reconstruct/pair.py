@@ -29,15 +29,8 @@ def check_pair(first: Capture, second: Capture, index: int, variance: Float[np.n
     `variance` is that of the difference of the two mean pictures.
     """
     _same_settings(first, second, index)
+    check_light(first, second, index)
     before, after = first.images[index].mean, second.images[index].mean
-    dark, light = sorted((first, second), key=lambda one: float(one.images[index].mean.mean()))
-    levels = [float(one.images[index].mean.mean()) for one in (dark, light)]
-    if levels[0] < _LEAST_LIGHT * levels[1]:
-        raise BadInputError(
-            f"{dark.folder.name}: the {dark.role} picture has {100 * levels[0] / max(levels[1], 1e-9):.0f} % of the "
-            f"light of the {light.role}; expected the same. Was a lamp or the projector off? Switch it on, let it "
-            f"warm up, and take the {dark.role} again."
-        )
     moved_px = _moved_px(before, after)
     if np.hypot(*moved_px) > REACH_PX:
         raise BadInputError(
@@ -53,6 +46,18 @@ def check_pair(first: Capture, second: Capture, index: int, variance: Float[np.n
             f"{soft.folder.name}: the {soft.role} picture has {100 * min(sharp) / max(sharp):.0f} % of the fine "
             "structure of the other one; expected as much. It is out of focus, or the camera shook. Focus, fix the "
             "lens, and take both again."
+        )
+
+
+def check_light(first: Capture, second: Capture, index: int) -> None:
+    """Raise BadInputError if view `index` of one of two captures was taken without its light."""
+    dark, light = sorted((first, second), key=lambda one: float(one.images[index].mean.mean()))
+    levels = [float(one.images[index].mean.mean()) for one in (dark, light)]
+    if levels[0] < _LEAST_LIGHT * levels[1]:
+        raise BadInputError(
+            f"{dark.folder.name}: the {dark.role} picture has {100 * levels[0] / max(levels[1], 1e-9):.0f} % of the "
+            f"light of the {light.role}; expected the same. Was a lamp or the projector off? Switch it on, let it "
+            f"warm up, and take the {dark.role} again."
         )
 
 

@@ -143,13 +143,14 @@ def test_a_lamp_that_ripples_does_not_pass_for_a_shift():
     assert not found.refused.any()
 
 
+@pytest.mark.parametrize("radius_px", [70, 170])
 @pytest.mark.parametrize("covering", ["something plain", "another pattern", "a pattern that moves"])
-def test_windows_that_something_covers_are_refused_and_the_others_are_not(covering):
+def test_windows_that_something_covers_are_refused_and_the_others_are_not(covering, radius_px):
     rng = np.random.default_rng(2)
     reference = band_limited((384, 384), 8, shortest_px=5.0).astype(float)
     flow = band_limited((384, 384), 8, (0.02, 0.01), shortest_px=5.0).astype(float)
     rows, columns = np.mgrid[:384, :384]
-    covered = (columns - 200) ** 2 + (rows - 180) ** 2 < 70**2
+    covered = (columns - 200) ** 2 + (rows - 180) ** 2 < radius_px**2
     other = band_limited((384, 384), 9, (1.5, 0.5), shortest_px=9.0)
     flow[covered] = {"something plain": 0.35, "another pattern": other[covered]}.get(covering, 0.0)
     if covering == "a pattern that moves":
