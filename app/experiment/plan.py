@@ -100,6 +100,18 @@ class PresetLine(Strict):
     reason: str
 
 
+class AveragingLine(Strict):
+    """How the air would move, and how long to average: a mean over `averaged_s` lies `error_k` from a long one.
+
+    T departs from its mean by `fluctuation_k` (rms over the room), for about `stays_s` at a time.
+    """
+
+    fluctuation_k: float
+    stays_s: float
+    error_k: list[float]
+    averaged_s: list[float]
+
+
 class Plan(Strict):
     """Everything that can be said beforehand.
 
@@ -114,6 +126,7 @@ class Plan(Strict):
     expected_departure_k: float
     views: list[ViewLine]
     seen: SeenLine
+    averaging: AveragingLine | None = None
     choices: list[ChoiceLine]
     presets: list[PresetLine]
     machine: str

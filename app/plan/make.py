@@ -8,6 +8,7 @@ import numpy as np
 from app.experiment.folder import Experiment, open_experiment
 from app.experiment.plan import (
     PLAN_FILE,
+    AveragingLine,
     ChoiceLine,
     MapLine,
     PlacesLine,
@@ -29,13 +30,14 @@ from app.reconstruct.problem import known_of
 from core.displacement import resolve_window_px
 from core.known import level_of
 from core.metrics import departure, inner, rms
+from core.plan.averaging import Fluctuation
 from core.plan.choice import Choice
 from core.plan.expected import ExpectedFlow, expected_flow
 from core.plan.observability import seen
 from core.plan.places import place_map
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import Signal, other_light, shift_map, signal
-from core.plan.verdicts import blindness, broken, verdict
+from core.plan.verdicts import blindness, broken, moving, verdict
 from core.problem import Problem
 from core.view_frame import facing, turn_of
 
@@ -74,6 +76,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
             boundary=determined.boundary,
             both=determined.both,
         ),
+        averaging=_averaging(flow.fluctuation),
         choices=[_choice_line(choice) for choice in choices],
         presets=preset_lines(problem, flow),
         machine=source(),
@@ -83,6 +86,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
                 for n, (s, view) in enumerate(zip(signals, views, strict=True))
             ),
             blindness(determined, [view.name for view in problem.scene.views]),
+            *moving(flow.fluctuation),
             *broken(choices),
         ],
     )
@@ -174,6 +178,18 @@ def _view_line(
         ).percentile_px(99),
         map=_map(found),
         places=places,
+    )
+
+
+def _averaging(moves: Fluctuation | None) -> AveragingLine | None:
+    if moves is None:
+        return None
+    wished_k = moves.round_errors_k()
+    return AveragingLine(
+        fluctuation_k=moves.std_k,
+        stays_s=moves.time_s,
+        error_k=wished_k,
+        averaged_s=[moves.seconds_for(error_k) for error_k in wished_k],
     )
 
 

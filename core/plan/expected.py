@@ -17,6 +17,7 @@ from core.estimate.plane_openings import with_plane_openings
 from core.estimate.prior import room_prior
 from core.fields import SplineField, plume, through_vertices
 from core.known_temperature import VertexGrid
+from core.plan.averaging import Fluctuation, fluctuation
 from core.problem import Problem
 from core.room.forward import closure_name, room
 from core.room.march import MarchSettings
@@ -37,7 +38,8 @@ _VERTICES = 33
 class ExpectedFlow:
     """Excess temperature on a vertex grid, and in words where it comes from; the rest if it was marched.
 
-    `step_s` is the longest stable time step on cells of `cell_m`, for the cost of finer marches.
+    `step_s` is the longest stable time step on cells of `cell_m`, for the cost of finer marches; `fluctuation` is how
+    the air would move about this mean, where a closure tells.
     """
 
     grid: VertexGrid
@@ -48,6 +50,7 @@ class ExpectedFlow:
     step_s: float | None = None
     cell_m: float | None = None
     turnover_ratio: float = 1.0
+    fluctuation: Fluctuation | None = None
 
     def excess_refractivity(self, air: Air) -> Float[Array, "nx ny nz"]:
         """N - N0 on the vertices."""
@@ -118,7 +121,9 @@ def _marched(problem: Problem) -> ExpectedFlow:
     # A short coarse march may overshoot: the air is no warmer, and no colder, than what drives it.
     stated = [0.0, *_stated_excesses_k(problem)]
     excess = np.clip(excess, min(stated), max(stated))
-    step_s = float(longest_step_s(done.flow.last, coarse.model(prior.mean), MarchSettings().courant))
+    model = coarse.model(prior.mean)
+    step_s = float(longest_step_s(done.flow.last, model, MarchSettings().courant))
+    solids = model.boundary.solids
     speed = float(np.sqrt(np.mean(np.sum(np.square(done.fields.velocity_m_s), -1))))
     pressure = done.fields.pressure_m2_s2
     return ExpectedFlow(
@@ -130,6 +135,7 @@ def _marched(problem: Problem) -> ExpectedFlow:
         step_s,
         min(coarse.grid.spacing_m),
         coarse.turnover_ratio,
+        fluctuation(done.flow.mean, coarse.grid, None if solids is None else np.asarray(solids.air) > 0),
     )
 
 
@@ -139,15 +145,12 @@ def _without_layers(excess_k: Volume) -> Volume:
 
 
 def _rescaled(flow: ExpectedFlow, excess_k: float, known_k: float) -> ExpectedFlow:
-    return ExpectedFlow(
-        flow.grid,
-        flow.excess_k * (excess_k / known_k),
-        f"{flow.source}, scaled to {excess_k:g} K",
-        flow.speed_rms_m_s,
-        flow.pressure_rms_m2_s2,
-        flow.step_s,
-        flow.cell_m,
-        flow.turnover_ratio,
+    larger, moves = excess_k / known_k, flow.fluctuation
+    return replace(
+        flow,
+        excess_k=flow.excess_k * larger,
+        source=f"{flow.source}, scaled to {excess_k:g} K",
+        fluctuation=None if moves is None else replace(moves, std_k=larger * moves.std_k),
     )
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from core.plan.averaging import Fluctuation
 from core.plan.choice import Choice
 from core.plan.expected import ExpectedFlow
 from core.plan.observability import Seen
@@ -114,6 +115,27 @@ def _added(found: Seen, names: Sequence[str]) -> str:
     said = [f"{names[0]!r} alone fixes {100 * alone:.0f} %"]
     said += [f"with {name!r} it is {100 * share:.0f} %" for name, share in zip(names[1:], more, strict=True)]
     return f"Of an unknown flow's variance {', '.join(said)}. "
+
+
+def moving(air: Fluctuation | None) -> list[str]:
+    """How the air would move about its mean, and how long to average; nothing where no turbulence is expected."""
+    if air is None:
+        return []
+    wished = "; ".join(
+        f"to {error_k:g} K, {_time(air.seconds_for(error_k))}" for error_k in air.round_errors_k()
+    )
+    return [
+        f"The air moves: T departs from its mean by {air.std_k:.2g} K (rms), for some {air.time_s:.1g} s at a time. "
+        f"How long to average (capture flow --bursts, --every-s) to know the mean {wished}."
+    ]
+
+
+def _time(seconds: float) -> str:
+    """Two leading digits, in the unit that reads best."""
+    for unit, length_s in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * length_s:
+            return f"{seconds / length_s:.2g} {unit}"
+    return f"{seconds:.2g} s"
 
 
 def broken(choices: tuple[Choice, ...]) -> list[str]:
