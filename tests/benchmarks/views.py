@@ -1,7 +1,9 @@
 """What a second and a third view add: one room, seen at y_max alone, with x_max too, with the ceiling too.
 
 Each is an experiment of its own, simulated, reconstructed and scored by the product's functions. One JSON line a set
-of views: the errors of T and u, how many points the 95 % intervals hold, and the seconds.
+of views: the errors of T and u, how many points the 95 % intervals hold, and the seconds. `line_means_K` is the error
+of the best sum of fields that each do not vary along one of the views: what means along parallel lines, without
+noise, leave to whoever knows nothing else.
 
     python -m tests.benchmarks.views TRUTH.npz [--camera-px 1024] [--frames 60] [--preset draft] [--seed 0]
 """
@@ -11,9 +13,12 @@ import json
 import tempfile
 from pathlib import Path
 
+import numpy as np
+
 from app.experiment.rig_settings import SimulatedCameraSettings
 from app.pipeline import reconstruct
 from app.simulate.experiment import simulate
+from app.volume.file import RoomVolume, read_volume
 from app.volume.scene import RIG_PLACES, RigOptions
 from app.volume.score import score_experiment
 from core.geometry import WallName
@@ -24,6 +29,19 @@ SETS: tuple[tuple[WallName, ...], ...] = (
     ("y_max", "x_max"),
     ("y_max", "x_max", "z_max"),
 )
+
+
+_AXES = {"x": 0, "y": 1, "z": 2}
+
+
+def line_means_k(truth: RoomVolume, walls: tuple[WallName, ...]) -> float:
+    """The rms in the air of what no view along `walls` shows at all."""
+    left = truth.temperature_k[1:-1, 1:-1, 1:-1].astype(np.float64)
+    # Means along different axes commute, so the projections on what they leave multiply.
+    for wall in walls:
+        left = left - left.mean(axis=_AXES[wall[0]], keepdims=True)
+    air = np.ones(left.shape, bool) if truth.solid is None else ~truth.solid[1:-1, 1:-1, 1:-1]
+    return float(np.sqrt(np.mean(left[air] ** 2)))
 
 
 def main() -> None:
@@ -65,6 +83,7 @@ def main() -> None:
                     "frames": asked.frames,
                     "seed": asked.seed,
                     "T_rms_K": scores["T"]["rms_K"],
+                    "line_means_K": line_means_k(read_volume(asked.truth), walls),
                     "T_departure": scores["T"]["rel_departure"],
                     "T_within": scores["T_within"],
                     "u": None if scores["u"] is None else scores["u"]["rel"],
