@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from core.geometry import Box, looking_along_y
+from core.geometry import Box, WallName, looking_along_y
 from core.objects import RoomObject
 from core.room.boundary_conditions import RoomParameters, room_layout
 from core.room.forward import Room, room
@@ -89,20 +89,23 @@ def plume(cell_m: float) -> dict[str, float | str]:
     buoyancy_m4_s3 = 9.81 / 293.15 * _POWER_W / 1206.0
     # More than the plume needs at the ceiling, so that the air round it stays as it is.
     supply_m_s = 1.5 * _PLUME * buoyancy_m4_s3 ** (1 / 3) * size_m[2] ** (5 / 3) / (2 * size_m[1] * size_m[2])
+    sides: tuple[tuple[WallName, float], ...] = (("x_min", 1.0), ("x_max", -1.0))
     walls = [
         Inlet(
             patch=Patch(wall=wall, lower_m=(0.0, 0.0), upper_m=(size_m[1], size_m[2])),
             temperature_k=293.15,
             velocity_m_s=(way * supply_m_s, 0.0, 0.0),
         )
-        for wall, way in (("x_min", 1.0), ("x_max", -1.0))
+        for wall, way in sides
     ]
     scene = _scene(
         size_m,
         (
             *walls,
             Outlet(patch=Patch(wall="z_max", lower_m=(0.0, 0.0), upper_m=size_m[:2])),
-            *(Wall(wall=wall, thermal="adiabatic", no_slip=False) for wall in ("y_min", "y_max", "z_min")),
+            Wall(wall="y_min", thermal="adiabatic", no_slip=False),
+            Wall(wall="y_max", thermal="adiabatic", no_slip=False),
+            Wall(wall="z_min", thermal="adiabatic", no_slip=False),
         ),
         RoomObject(
             name="block",
