@@ -28,7 +28,7 @@ REACH_PX = 8
 _LOST = 0.1
 # A refused window leaves so many times the rms of the picture's median window,
 _UNLIKE = 3.0
-# or its pattern is so much fainter or brighter than in the reference. A lamp does not change by as much.
+# or its pattern is so much fainter or brighter than in the reference, beside how the whole light changed.
 _FAINT = 2.0
 
 
@@ -64,7 +64,7 @@ def measure_shift(
         displacement_px=fit.displacement_px,
         information_per_px2=fit.information_per_px2,
         window_px=window_px,
-        refused=_unlike(fit),
+        refused=_unlike(fit, light=float(np.mean(flow_image) / max(np.mean(reference_image), 1e-9))),
     )
 
 
@@ -110,14 +110,15 @@ def _lost(fit: WindowFit) -> Bool[np.ndarray, " windows"]:
     return (fit.chi_squared > _UNLIKE**2) & (fit.chi_squared > _LOST * fit.contrast)
 
 
-def _unlike(fit: WindowFit) -> Bool[np.ndarray, " windows"]:
+def _unlike(fit: WindowFit, light: float) -> Bool[np.ndarray, " windows"]:
     """Windows that show something else than the pattern, moved.
 
     They have lost the pattern, or leave more than the median of those that have not. Where most windows leave much
-    of the pattern, these have lost it too: the median is no pattern then.
+    of the pattern, these have lost it too: the median is no pattern then. `light` is the flow picture's mean over the
+    reference's.
     """
-    gain = (fit.gain > 1 / _FAINT) & (fit.gain < _FAINT)
-    gone = ~gain & (fit.information_per_px2.trace(axis1=1, axis2=2) > 1.0)
+    gain = fit.gain / max(light, 1e-9)
+    gone = ~((gain > 1 / _FAINT) & (gain < _FAINT)) & (fit.information_per_px2.trace(axis1=1, axis2=2) > 1.0)
     if (gone | _lost(fit)).mean() > 0.5:
         gone |= _lost(fit)
     others = ~gone if not gone.all() else gone
