@@ -198,13 +198,13 @@ def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlan
         float(layout.heated[wall]) * closed * jnp.exp(parameters.log_heat + parameters.wall_log_heat[wall])
     )
     heat = conductance * parameters.wall_excess_k[wall]
-    held = jnp.full_like(conductance, layout.held[wall])
+    held = jnp.full_like(conductance, layout.heated[wall])
     for n, opening in enumerate(layout.heaters):
         if opening.wall == wall:
             fraction = jnp.asarray(opening.fraction, jnp.float32)
             own = fraction * jnp.exp(parameters.heater_log_heat[n])
             conductance, heat = conductance + own, heat + own * parameters.heater_excess_k[n]
-            held = jnp.maximum(held, fraction * float(layout.shown[n]))
+            held = jnp.maximum(held, fraction) if layout.shown[n] else jnp.where(fraction > 0, 0.0, held)
     return eqx.tree_at(
         lambda w: (w.conductance_m_s, w.wall_excess_k, w.held),
         plane,

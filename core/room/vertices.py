@@ -25,7 +25,11 @@ class RoomFields(eqx.Module):
 
 
 def vertex_excess_k(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> Vertices:
-    """Excess temperature: on inlets the supply's, on walls and heaters the stated one, else that of the next air."""
+    """Excess temperature: on inlets the supply's, on walls and heaters their own, else that of the next air.
+
+    The layer between a wall and the air bends every ray that crosses it at a slant: of the signal of a camera that
+    looks into a room through a wall of glass from 4 m, most.
+    """
 
     def value(wall: WallPlane, cell: Field, inward: float) -> Field:
         share = jnp.where(wall.conductance_m_s > 0, wall.held, 0.0)

@@ -20,8 +20,8 @@ class WallPlane(eqx.Module):
 
     `conductance_m_s` is the kinematic heat coefficient q / (rho c dT), and `wall_excess_k` the wall's temperature,
     weighted with it where several parts share a face. `no_slip` is 1 for a no-slip wall and 0 for a free surface.
-    `held` is the share of the face with a stated temperature, which its vertices show. `turbulent_energy_m2_s2`
-    and `dissipation_m2_s3` are those of the air that flows in.
+    `held` is the share of the face that has a temperature of its own, stated or fitted, which its vertices show.
+    `turbulent_energy_m2_s2` and `dissipation_m2_s3` are those of the air that flows in.
     """
 
     normal_m_s: Plane

@@ -30,6 +30,7 @@ from core.problem import Problem, ShiftMeasurement
 from core.result import Outcome, Solution
 from core.scene import ProjectedPattern
 from core.setting import SettingError
+from core.solve.draft.front_layers import front_layers_px
 from core.solve.draft.temperature_deviation import deviation
 from core.solve.draft.temperature_prior import (
     TemperatureSettings,
@@ -49,7 +50,7 @@ from core.solve.draft.temperature_system import (
     linear_operator,
     preconditioner,
     steepest_slopes,
-    without_drift,
+    without_shared_errors,
 )
 from core.view_frame import looked_along
 from core.watch import Row, Watch
@@ -143,7 +144,8 @@ def _system(
     representation = _paths(problem) * settings.representation
     weights = tuple(data_weight(nearly_still(s), representation) for s in problem.shifts)
     rays = operators
-    still = [without_drift(*of) for of in zip(rays, problem.shifts, weights, strict=True)]
+    layers_px = front_layers_px(problem, rays, grid, per_k)
+    still = [without_shared_errors(*of) for of in zip(rays, problem.shifts, weights, layers_px, strict=True)]
     operators, shifts = tuple(operator for operator, _ in still), tuple(shift for _, shift in still)
     lengths = lengths_m(grid, settings, looked_along(problem.scene))
     size = prior_size(operators, weights, shifts, prior, grid, lengths)

@@ -23,7 +23,7 @@ from core.solve.draft.temperature_system import ShiftOperator, Volume
 _LEAST_SIZE = 1e-9
 _LEAST_RANGE_K = 0.1
 # A profile rises by something between nothing and the range of the air that is known: the mean and deviation of that.
-_RISE, _RISE_STD = 0.5, 12**-0.5
+_RISE, RISE_STD = 0.5, 12**-0.5
 _DRAWS = 4
 
 
@@ -48,7 +48,7 @@ class TemperatureSettings:
 
 def profile_weight(reach: float, grid: VertexGrid) -> float:
     """One over the variance of the profile's step from one height to the next, as of a random walk."""
-    return (grid.shape[2] - 1) / (_RISE_STD * reach) ** 2
+    return (grid.shape[2] - 1) / (RISE_STD * reach) ** 2
 
 
 def level_k(known: KnownTemperature, prior_k: Volume) -> float:

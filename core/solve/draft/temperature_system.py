@@ -106,12 +106,20 @@ class StillOperator:
         return self.rays.transpose(self.still.transpose(displacement_px))
 
 
-def without_drift(
-    operator: ShiftOperator, shift: ShiftMeasurement, weight: Float[np.ndarray, "windows 2 2"]
+def without_shared_errors(
+    operator: ShiftOperator,
+    shift: ShiftMeasurement,
+    weight: Float[np.ndarray, "windows 2 2"],
+    layers_px: Float[np.ndarray, "windows 2 errors"],
 ) -> tuple[ShiftOperator, ShiftMeasurement]:
-    """The operator and the shifts without what windows share (the camera's motion), for windows of this weight."""
-    errors_px = shift.common_errors_px
-    if errors_px is None:
+    """The operator and the shifts without what windows share: the camera's motion, and layers on the wall before it.
+
+    For windows of this weight.
+    """
+    errors_px = layers_px
+    if shift.common_errors_px is not None:
+        errors_px = np.concatenate([shift.common_errors_px, layers_px], axis=-1)
+    if errors_px.shape[-1] == 0:
         return operator, shift
     still = without_motion(errors_px, weight)
     return StillOperator(operator, still), replace(shift, displacement_px=still.apply(shift.displacement_px))

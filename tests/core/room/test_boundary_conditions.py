@@ -154,6 +154,22 @@ def test_a_heater_shows_its_own_temperature_on_its_vertices_which_no_correction_
     assert np.all(free[..., 1:-1] == 1.0)
 
 
+def test_a_wall_that_passes_heat_shows_its_temperature_whoever_stated_it_and_an_adiabatic_one_that_of_the_air():
+    grid = room_grid(ROOM, 8)
+    stated = Wall(wall="y_max", thermal="temperature", temperature_k=293.15)
+    layout = room_layout(scene(SUPPLY, EXHAUST, Wall(wall="x_max", thermal="adiabatic"), stated), grid)
+    cold = dataclasses.replace(parameters(1, 0), wall_excess_k=jnp.full(6, -2.0))
+    closure = KEpsilonClosure(jnp.float32(1.0), jnp.float32(1.5e-5))
+    model = room_model(grid, boundary(layout, cold), closure, buoyancy_m_s2_k=0.0, molecular_m2_s=1.5e-5)
+
+    excess = np.asarray(vertex_excess_k(air_at_rest(model, jnp.full(grid.cells, 3.0), 0.5), model, (9, 9, 9)))
+
+    assert excess[2:-2, 0, 2:-2] == pytest.approx(-2.0, abs=1e-3)
+    assert excess[2:-2, -1, 2:-2] == pytest.approx(-2.0, abs=1e-3)
+    assert excess[-1, 2:-2, 2:-2] == pytest.approx(3.0)
+    assert excess[3:-3, 3:-3, 3:-3] == pytest.approx(3.0)
+
+
 def test_layers_exchange_all_heat_that_is_not_lost():
     grid = room_grid(ROOM, 8)
     layout = room_layout(scene(SUPPLY, EXHAUST), grid)
