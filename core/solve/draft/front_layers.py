@@ -28,12 +28,18 @@ def front_layers_px(
         front, errors = _opposite(view.wall), []
         stated = walls[front]
         if stated is None or stated.thermal != "adiabatic":
-            for over_height in (np.ones(grid.shape[2]), np.linspace(-1.0, 1.0, grid.shape[2])):
+            for jump in _jumps(front, grid):
                 layer = np.zeros(grid.shape)
-                on_wall(front, layer)[...] = per_k * jump_k * over_height
+                on_wall(front, layer)[...] = per_k * jump_k * on_wall(front, jump)
                 errors.append(operator.apply(layer))
         found.append(np.stack(errors, axis=-1) if errors else np.zeros((*shift.displacement_px.shape, 0)))
     return found
+
+
+def _jumps(wall: WallName, grid: VertexGrid) -> list[Float[np.ndarray, "nx ny nz"]]:
+    """The same all over the wall, and rising with the height; floor and ceiling have one height."""
+    rising = np.broadcast_to(np.linspace(-1.0, 1.0, grid.shape[2]), grid.shape)
+    return [np.ones(grid.shape), rising][: 1 if wall in ("z_min", "z_max") else 2]
 
 
 def _opposite(wall: WallName) -> WallName:
