@@ -82,13 +82,15 @@ def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"
 
 
 def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.ndarray, "vx vy vz"]:
-    """1 at each vertex, but 0 on walls and heaters of stated temperature."""
+    """1 at each vertex, but 0 on walls and heaters that have a temperature of their own, stated or fitted."""
     free = np.ones(shape)
-    for wall in np.flatnonzero(layout.held):
+    for wall in np.flatnonzero(layout.heated):
         free[_plane(face_of(WALLS[wall]))] = 0.0
-    for heater in (h for h, shown in zip(layout.heaters, layout.shown, strict=True) if shown):
+    for heater, shown in zip(layout.heaters, layout.shown, strict=True):
         first, second = (cell_matrix(layout.grid, a, shape[a]) for a in AXES if a != heater.axis)
-        free[_plane(face_of(WALLS[heater.wall]))] *= 1.0 - first @ np.pad(heater.fraction, 1) @ second.T
+        covered, plane = first @ np.pad(heater.fraction, 1) @ second.T, _plane(face_of(WALLS[heater.wall]))
+        # A suspected heater shows the air before it.
+        free[plane] = free[plane] * (1.0 - covered) if shown else np.minimum(free[plane] + covered, 1.0)
     return free
 
 
