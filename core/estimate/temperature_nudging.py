@@ -82,9 +82,9 @@ def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"
 
 
 def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.ndarray, "vx vy vz"]:
-    """1 at each vertex, but 0 on walls and heaters that have a temperature of their own, stated or fitted."""
+    """1 at each vertex, but 0 on walls and heaters that show a temperature of their own."""
     free = np.ones(shape)
-    for wall in np.flatnonzero(layout.heated):
+    for wall in np.flatnonzero(layout.own):
         free[_plane(face_of(WALLS[wall]))] = 0.0
     for heater, shown in zip(layout.heaters, layout.shown, strict=True):
         first, second = (cell_matrix(layout.grid, a, shape[a]) for a in AXES if a != heater.axis)

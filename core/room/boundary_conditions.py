@@ -20,6 +20,7 @@ from core.room.solids import Solids, SurfaceHeat, lay_objects
 from core.room.wall_planes import Boundary, WallPlane, closed_wall
 from core.scene import Heater, Inlet, Outlet, Scene
 from core.setting import SettingError
+from core.view_frame import looked_along
 
 
 class SuspectedHeater(Heater):
@@ -53,8 +54,9 @@ class RoomLayout(eqx.Module):
     """Where openings and heaters are, what is stated about them, and sentences on what the grid cannot hold.
 
     `shown`: whether vertices on a heater get its temperature. `heated`, `no_slip`, `held`: of each wall, 1 if heat
-    passes it, if air sticks to it, and if its temperature is stated. `solids` are the objects in the room, and
-    `objects` those of the scene; None and empty where there are none.
+    passes it, if air sticks to it, and if its temperature is stated. `own`: 1 if its vertices show its own
+    temperature and not the air's: a stated one, and a fitted one where a camera looks through the wall or at it.
+    `solids` are the objects in the room, and `objects` those of the scene; None and empty where there are none.
     """
 
     grid: RoomGrid
@@ -67,6 +69,7 @@ class RoomLayout(eqx.Module):
     heated: Float[np.ndarray, "6"]
     no_slip: Float[np.ndarray, "6"]
     held: Float[np.ndarray, "6"]
+    own: Float[np.ndarray, "6"]
     notes: tuple[str, ...] = eqx.field(static=True)
     objects: tuple[RoomObject, ...] = eqx.field(static=True, default=())
     solids: Solids | None = None
@@ -122,11 +125,20 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
         heated,
         no_slip,
         held,
+        np.maximum(held, heated * _in_sight(scene)),
         tuple(notes),
         scene.objects,
         solids,
         scene.air.heat_capacity_j_m3_k,
     )
+
+
+def _in_sight(scene: Scene) -> Float[np.ndarray, "6"]:
+    """Of each wall, 1 where a camera looks through it or at it: there the layer of its air bends every ray.
+
+    Beside the others the pictures are left out (`core.data_error.WALL_MARGIN`), so nothing tells such a temperature.
+    """
+    return np.array([float(wall // 2 in looked_along(scene)) for wall in range(6)])
 
 
 def boundary(layout: RoomLayout, parameters: RoomParameters) -> Boundary:
@@ -198,7 +210,7 @@ def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlan
         float(layout.heated[wall]) * closed * jnp.exp(parameters.log_heat + parameters.wall_log_heat[wall])
     )
     heat = conductance * parameters.wall_excess_k[wall]
-    held = jnp.full_like(conductance, layout.heated[wall])
+    held = jnp.full_like(conductance, layout.own[wall])
     for n, opening in enumerate(layout.heaters):
         if opening.wall == wall:
             fraction = jnp.asarray(opening.fraction, jnp.float32)
