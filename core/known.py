@@ -12,7 +12,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from core.geometry import WALLS, WallName, face_of
 from core.problem import PlaneData, Problem
-from core.scene import Heater, Inlet, Outlet, Patch, Scene, Wall
+from core.scene import Driving, Heater, Inlet, OnPatch, Outlet, Patch, Scene, Wall
 from core.setting import SettingError
 
 # As `airlens simulate --information` names them; `images`: not even a plane.
@@ -39,7 +39,7 @@ def unknown_walls(scene: Scene) -> list[WallName]:
 
 def level_of(problem: Problem) -> Level:
     """How much is known: what drives the air and all walls, what drives the air, a plane, or images alone."""
-    if any(isinstance(part, Inlet | Heater) for part in problem.scene.boundary):
+    if any(isinstance(part, Driving) for part in problem.scene.boundary):
         return "operator" if unknown_walls(problem.scene) else "surveyed"
     return "paper" if problem.planes else "images"
 
@@ -81,7 +81,7 @@ def share_area(one: Patch, other: Patch) -> bool:
     return one.wall == other.wall and min(shared) > 1e-9
 
 
-def refuse_overlaps(parts: Sequence[Inlet | Outlet | Heater]) -> None:
+def refuse_overlaps(parts: Sequence[OnPatch]) -> None:
     """Raise SettingError if two of these share area on a wall."""
     for one, other in combinations(parts, 2):
         if share_area(one.patch, other.patch):

@@ -305,6 +305,9 @@ class PointSensors:
 
 
 BoundaryInformation = PlaneField | Inlet | Outlet | Wall | Heater | PointSensors
+# The kinds that take a place on a wall, no two the same; and those that drive the air.
+OnPatch = Inlet | Outlet | Heater
+Driving = Inlet | Heater
 
 
 @setting

@@ -14,13 +14,14 @@ from app.report.figures import AIR, SEQUENTIAL
 from core.comfort import CELSIUS_K
 from core.geometry import Box, Vector3, face_of
 from core.result import Solution
-from core.scene import Heater, Inlet, Outlet, Patch, Scene
+from core.scene import OnPatch, Patch, Scene
 
 # From the front, a little from the left and from above.
 _AZIMUTH_RAD, _ELEVATION_RAD = np.radians(-68.0), np.radians(20.0)
 # Starts of lines along each axis, points of a line, and how long a line is over the room's diagonal.
 _STARTS, _POINTS, _LENGTH = (4, 4, 4), 160, 0.9
 _COLOURS = {"inlet": "#1f77d0", "outlet": "#d06a1f", "heater": "#c62828"}
+_OTHER = "#777777"
 _WORDS = {"inlet": "supply", "outlet": "outlet", "heater": "heater"}
 
 Points = Float[np.ndarray, "... 3"]
@@ -138,16 +139,14 @@ def _plane(axis, solution: Solution, order: int):
 
 def _openings(axis, scene: Scene) -> None:
     for part in scene.boundary:
-        if isinstance(part, Inlet | Outlet | Heater):
+        if isinstance(part, OnPatch):
             corners = paper(np.array(corners_of(part.patch, scene.room)))
-            colour = _COLOURS[part.kind]
+            colour, word = _COLOURS.get(part.kind, _OTHER), _WORDS.get(part.kind, part.kind)
             axis.add_patch(
                 Polygon(corners, closed=True, facecolor=colour, alpha=0.55, edgecolor=colour, zorder=1.5)
             )
             x, y = corners.mean(axis=0)
-            axis.text(
-                x, y, _WORDS[part.kind], ha="center", va="center", fontsize=9, zorder=6, color="#111111"
-            )
+            axis.text(x, y, word, ha="center", va="center", fontsize=9, zorder=6, color="#111111")
 
 
 def corners_of(patch: Patch, room: Box) -> list[Vector3]:

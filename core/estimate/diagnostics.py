@@ -10,7 +10,7 @@ from core.estimate.prior import Prior, looked_through
 from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
-from core.scene import Heater, Inlet
+from core.scene import Driving, Heater, Inlet
 
 # In one room of twenty an entry is called wrong that is as right as it was stated to be.
 _FALSE_ALARMS = 0.05
@@ -181,7 +181,7 @@ def balances(
 
 def undetermined(problem: Problem) -> list[str]:
     """One sentence on what the stated information cannot determine; none if all is stated."""
-    driving = [b for b in problem.scene.boundary if isinstance(b, Inlet | Heater)]
+    driving = [b for b in problem.scene.boundary if isinstance(b, Driving)]
     if all(isinstance(b, SuspectedHeater) for b in driving):
         return [
             "No inlet or heater is stated, so nothing says what drives the air. These measurements do not "

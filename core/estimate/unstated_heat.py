@@ -26,7 +26,7 @@ from core.known import leaving_excess_k, share_area
 from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.room.forward import Room, room
-from core.scene import Heater, Inlet, Outlet, Patch
+from core.scene import Heater, OnPatch, Patch
 
 # Strips along x, and their depth along y as a share of the room's.
 _STRIPS, _DEPTH_SHARE = 5, 0.2
@@ -123,7 +123,7 @@ def floor_strips(problem: Problem, *, between: bool = False) -> list[SuspectedHe
     edges_m = 0.5 * (edges_m[:-1] + edges_m[1:]) if between else edges_m
     middle_m, half_m = box.centre_m[1], 0.5 * _DEPTH_SHARE * box.size_m[1]
     air_k = scene.air.ambient_temperature_k + (leaving_excess_k(problem) or 0.0)
-    taken = [b.patch for b in scene.boundary if isinstance(b, Inlet | Outlet | Heater)]
+    taken = [b.patch for b in scene.boundary if isinstance(b, OnPatch)]
     strips = []
     for low_m, high_m in pairwise(edges_m):
         lower, upper = (float(low_m), middle_m - half_m), (float(high_m), middle_m + half_m)

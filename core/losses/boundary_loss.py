@@ -15,7 +15,7 @@ from core.losses.boussinesq import FlowValues
 from core.losses.physics import BoundaryLoss, KnownValues, MeanLoss, PointLoss
 from core.losses.representation import Span, Spans, points_of, positions
 from core.problem import PlaneData, Problem, SensorData
-from core.scene import Heater, Inlet, Outlet, Patch, Wall
+from core.scene import Heater, Inlet, OnPatch, Outlet, Patch, Wall
 from core.setting import SettingError
 from core.solve.nondimensional import RoomFrame
 
@@ -33,7 +33,7 @@ def boundary_loss(problem: Problem, frame: RoomFrame, *, weight: float, points_a
     patches = [_plane(plane, frame, points_an_axis) for plane in problem.planes]
     known = {plane.wall for plane in problem.planes}
     items = problem.scene.boundary
-    held = [item.patch for item in items if isinstance(item, Inlet | Outlet | Heater)]
+    held = [item.patch for item in items if isinstance(item, OnPatch)]
     for item in items:
         match item:
             case Wall() if item.wall not in known:

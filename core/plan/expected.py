@@ -22,7 +22,7 @@ from core.problem import Problem
 from core.room.forward import closure_name, room
 from core.room.march import MarchSettings
 from core.room.step import longest_step_s
-from core.scene import Heater, Inlet, Scene, Wall
+from core.scene import Driving, Heater, Inlet, Scene, Wall
 from core.setting import SettingError
 from core.view_frame import Turn
 
@@ -95,7 +95,7 @@ def expected_flow(problem: Problem, excess_k: float | None = None) -> ExpectedFl
         )
     problem = with_plane_openings(problem)
     known = largest_contrast_k(problem)
-    if any(isinstance(b, Inlet | Heater) for b in problem.scene.boundary) and known:
+    if any(isinstance(b, Driving) for b in problem.scene.boundary) and known:
         marched = _marched(problem)
         return marched if excess_k is None else _rescaled(marched, excess_k, known)
     return plume_flow(problem, excess_k)

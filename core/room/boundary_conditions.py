@@ -18,7 +18,7 @@ from core.room.openings import Opening, lay_patch, supply_turbulence
 from core.room.room_grid import AXES, RoomGrid
 from core.room.solids import Solids, SurfaceHeat, lay_objects
 from core.room.wall_planes import Boundary, WallPlane, closed_wall
-from core.scene import Heater, Inlet, Outlet, Scene
+from core.scene import Heater, Inlet, OnPatch, Outlet, Scene
 from core.setting import SettingError
 from core.view_frame import looked_along
 
@@ -100,7 +100,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
             f"Air flows in at {flow} m/s but no outlet is named, so it cannot leave. "
             "Add [[scene.boundary]] with kind = 'outlet' and its patch."
         )
-    refuse_overlaps((*inlets, *outlets, *heaters))
+    refuse_overlaps([b for b in scene.boundary if isinstance(b, OnPatch)])
     for inlet in inlets:
         refuse_outward(inlet)
     notes: list[str] = []

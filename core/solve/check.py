@@ -5,7 +5,7 @@ import numpy as np
 from core.geometry import Box, Vector3
 from core.known import refuse_contradicted, refuse_outward, refuse_overlaps, stated_walls
 from core.problem import Problem, ShiftMeasurement
-from core.scene import Heater, Inlet, Outlet, Wall
+from core.scene import Heater, Inlet, OnPatch, Outlet, Wall
 from core.setting import SettingError
 from core.solve.regime import Regime
 
@@ -87,7 +87,7 @@ def _check_planes(problem: Problem) -> None:
 
 
 def _check_patches(problem: Problem) -> None:
-    parts = [item for item in problem.scene.boundary if isinstance(item, Inlet | Outlet | Heater)]
+    parts = [item for item in problem.scene.boundary if isinstance(item, OnPatch)]
     stated_walls(problem.scene)
     refuse_overlaps(parts)
     for inlet in (item for item in parts if isinstance(item, Inlet)):

@@ -1,6 +1,7 @@
 """One road from captures to report: what it keeps is what it used, and nothing after the solve can cost it."""
 
 import json
+import resource
 import shutil
 from collections.abc import Mapping
 
@@ -61,6 +62,38 @@ def test_a_report_that_cannot_be_written_leaves_the_result_and_says_why(disturbe
     (kept.folder / "report.html").rmdir()
     page = report_again(kept.folder.parents[1], kept.folder).read_text()
     assert page.count("data:image/png") == (done.folder / "report.html").read_text().count("data:image/png")
+
+
+@pytest.fixture(scope="module")
+def broken(experiment, tmp_path_factory):
+    """A draft at whose report the guide is half finished, the bundle broken, the truth gone and the disk full."""
+    copy = tmp_path_factory.mktemp("broken") / "room"
+    shutil.copytree(experiment, copy)
+    shutil.rmtree(copy / "results", ignore_errors=True)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def break_all(row: Mapping[str, float | str], growing: object) -> None:
+        if row["doing"] == "report":
+            (copy / "calibration" / "record-camera.json").write_text('{"camera": "camera"')
+            (copy / "calibration" / "bundle.json").write_text("{")
+            (copy / "truth.npz").unlink()
+            resource.setrlimit(resource.RLIMIT_FSIZE, (0, hard))
+
+    try:
+        return reconstruct(copy, "draft", watch=Watch(break_all))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_whatever_is_broken_at_the_report_the_result_is_there(broken, done):
+    assert "its report could not be written" in broken.no_report
+    assert "File too large" in broken.no_report
+    found = read_result(broken.folder / "result.nc")
+    np.testing.assert_array_equal(found.temperature_k, done.solution.temperature_k.astype(np.float32))
+    page = report_again(broken.folder.parents[1], broken.folder).read_text()
+    assert "There is no truth" in page
+    # Every picture but those that need the truth or the bundle.
+    assert page.count("data:image/png") >= 5
 
 
 def test_what_nothing_uses_is_not_told(done):
