@@ -15,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from app.experiment.calibration import read_bundle
-from app.experiment.folder import ExperimentSettings, open_experiment
+from app.experiment.folder import SETTINGS_FILE, ExperimentSettings, bundle_path, open_experiment
 from app.files.durable import make_folder, write_text
 from app.files.lock import locked
 from app.files.reading import reading
@@ -47,7 +47,7 @@ class CalibrationFolder:
 
     def settings(self) -> ExperimentSettings | None:
         """The experiment's settings, if there are any."""
-        if not (self.experiment / "experiment.toml").exists():
+        if not (self.experiment / SETTINGS_FILE).exists():
             return None
         return open_experiment(self.experiment).settings
 
@@ -133,7 +133,7 @@ class CalibrationFolder:
     def note(self, conditions: Conditions) -> None:
         """Write the conditions into the bundle, if there is one; what is not known leaves what was."""
         known = known_pairs(conditions)
-        if known and (self.folder / "bundle.json").exists():
+        if known and bundle_path(self.experiment).exists():
             self.change_bundle(lambda bundle: dataclasses.replace(bundle, **known))
 
     def change_bundle(self, change: Callable[[Bundle], Bundle]) -> Bundle:
@@ -141,7 +141,7 @@ class CalibrationFolder:
         make_folder(self.folder)
         with locked(self.folder):
             bundle = change(self.bundle())
-            write_text(self.folder / "bundle.json", to_json(bundle))
+            write_text(bundle_path(self.experiment), to_json(bundle))
         return bundle
 
     def _record_path(self, camera: str) -> Path:

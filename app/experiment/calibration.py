@@ -4,6 +4,7 @@ import functools
 from pathlib import Path
 
 from app.errors import BadInputError
+from app.experiment.folder import bundle_path
 from app.files.reading import reading
 from calibration.bundle import Bundle, from_json
 
@@ -13,7 +14,7 @@ def read_bundle(experiment: Path) -> Bundle | None:
 
     It is parsed again only when its content is another.
     """
-    path = experiment / "calibration" / "bundle.json"
+    path = bundle_path(experiment)
     try:
         with reading(path, "Calibrate again, or restore it from a copy."):
             return _parsed(path.read_bytes(), path) if path.exists() else None

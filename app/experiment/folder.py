@@ -1,9 +1,12 @@
-"""An experiment is a folder (layout below); this is the only module that knows where things are in it.
+"""An experiment is a folder. What lies in it:
 
     experiment.toml            rig and scene
-    calibration/bundle.json    models, with units, date, quality
-    captures/<id>/             manifest.json (written last), reference.tif or flow.tif
-    results/<id>/              result.nc, report.html, manifest.json (written last)
+    answers.toml               the answers that `airlens new` made these from, if it did
+    boundary/                  files that the scene names: known planes, sensors
+    plan.json                  what `airlens plan` said last
+    calibration/               bundle.json: models, with units, date, quality; record-<camera>.json: what they are of
+    captures/<id>/             manifest.json (written last), reference.tif or flow.tif, notes.txt
+    results/<id>/              result.nc, shift-<view>.nc, history.jsonl, report.html, manifest.json (written last)
     print/                     PDFs of the pattern and of boards, and what was printed (pattern.json, board.json)
     checkpoint/                a reconstruction that was stopped: `airlens reconstruct` goes on from it
     truth.npz                  simulated experiments only: the room that the twin looks at
@@ -28,6 +31,7 @@ from app.files.toml import Strict, from_toml, to_toml
 from core.scene import Scene
 
 SETTINGS_FILE = "experiment.toml"
+TRUTH_FILE = "truth.npz"
 WHAT_TO_DO = "Remove the folder, or restore it from a copy."
 _MOMENT = "%Y%m%dT%H%M%S"
 
@@ -47,6 +51,11 @@ class ExperimentSettings(Strict):
     """Room, air, cameras, light, and what is known."""
 
 
+def bundle_path(experiment: Path) -> Path:
+    """Where an experiment's folder keeps the calibration's models."""
+    return experiment / "calibration" / "bundle.json"
+
+
 @dataclass(frozen=True)
 class Experiment:
     """An experiment folder and its settings. `revision` tells one content of experiment.toml from another."""
@@ -58,7 +67,7 @@ class Experiment:
     @property
     def bundle_path(self) -> Path:
         """The calibration's models."""
-        return self.folder / "calibration" / "bundle.json"
+        return bundle_path(self.folder)
 
     @property
     def captures_folder(self) -> Path:

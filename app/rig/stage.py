@@ -1,6 +1,6 @@
 """What stands before the camera while it is calibrated: somebody holds a board, a screen shows patterns.
 
-On a real rig the operator does what a task says; a simulated rig (`app.rig.open.practice_stage`) does it itself.
+On a real rig the operator does what a task says; a simulated rig (`app.rig.practice_room`) does it itself.
 """
 
 from dataclasses import dataclass

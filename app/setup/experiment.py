@@ -7,6 +7,7 @@ from pathlib import Path
 from app.errors import BadInputError
 from app.experiment.folder import (
     SETTINGS_FILE,
+    TRUTH_FILE,
     Experiment,
     ExperimentSettings,
     create_experiment,
@@ -21,7 +22,7 @@ from app.files.toml_errors import in_file
 from app.files.toml_places import places_of
 from app.setup.answers import Answers
 from app.setup.mistakes import mistakes_in
-from app.setup.scene import SENSORS_FILE, TRUTH_FILE, sensor_table, settings_of
+from app.setup.scene import SENSORS_FILE, sensor_table, settings_of
 from app.volume.file import read_volume
 from app.volume.sample import SAMPLE_ROOM
 from app.volume.scene import room_box

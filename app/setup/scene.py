@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from app.errors import BadInputError
-from app.experiment.folder import ExperimentSettings
+from app.experiment.folder import TRUTH_FILE, ExperimentSettings
 from app.experiment.rig_settings import (
     AravisCameraSettings,
     ProjectorSettings,
@@ -35,7 +35,6 @@ from core.scene import (
 )
 from core.setting import SettingError
 
-TRUTH_FILE = "truth.npz"
 SENSORS_FILE = "boundary/sensors.csv"
 
 

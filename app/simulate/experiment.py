@@ -9,7 +9,7 @@ from typing import Literal
 
 from app.capture.burst import BurstWatch, take
 from app.errors import AirlensError, BadInputError
-from app.experiment.folder import ExperimentSettings, create_experiment
+from app.experiment.folder import TRUTH_FILE, ExperimentSettings, create_experiment
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.files.durable import durable_folder, write_durably, write_text
 from app.rig.open import air_of, open_camera
@@ -21,7 +21,6 @@ from calibration.bundle import given_bundle, to_json
 from core.scene import PlaneField, ProjectedPattern, Scene
 from drivers.burst import CapturePlan, CaptureRole, Progress
 
-TRUTH_FILE = "truth.npz"
 SNAPSHOTS_FILE = "snapshots.npz"
 
 OnStage = Callable[[str, int, int], object]

@@ -8,6 +8,7 @@ from typing import Literal
 
 from app.calibrate.folder import CalibrationFolder
 from app.experiment.folder import (
+    TRUTH_FILE,
     Experiment,
     ExperimentSettings,
     create_experiment,
@@ -16,7 +17,6 @@ from app.experiment.folder import (
 )
 from app.experiment.rig_settings import BoardSettings, ProjectorSettings, RigSettings, SimulatedCameraSettings
 from app.files.durable import write_durably
-from app.simulate.experiment import TRUTH_FILE
 from app.volume.file import read_volume
 from app.volume.sample import SAMPLE_ROOM
 from app.volume.scene import Information, RigOptions, room_scene, write_plane
