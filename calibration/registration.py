@@ -44,7 +44,7 @@ class FiniteSimilarity:
 
 @dataclass(frozen=True)
 class Registration:
-    """The motion, the standard deviations of (shift x, shift y [px], rotation [rad], scale), what is left.
+    """The motion, the standard deviations of (shift x, shift y [px], rotation [rad], scale).
 
     `sector_px` is the largest shift that a sector of the mask has beyond the motion: well above
     `shift_std_px`, something else moved there.
@@ -52,7 +52,6 @@ class Registration:
 
     motion: FiniteSimilarity
     std: Float[np.ndarray, "4"]
-    residual_rms: float
     sector_px: float
     iterations: int
     converged: bool
@@ -154,7 +153,7 @@ class _Problem:
         scale = np.linalg.norm(self.jacobian, axis=0)
         inverse = np.linalg.inv((self.jacobian / scale).T @ (self.jacobian / scale)) / np.outer(scale, scale)
         std = rms * np.sqrt(np.diag(inverse)[:4] * max(4 * np.pi * self.blur_px**2, 1.0))
-        return Registration(self._similarity(unknowns), std, rms, self._sectors(left), iterations, converged)
+        return Registration(self._similarity(unknowns), std, self._sectors(left), iterations, converged)
 
     def _sectors(self, left: np.ndarray) -> float:
         """The largest shift left over in one of twelve sectors about the centre."""

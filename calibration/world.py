@@ -12,7 +12,6 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from calibration.adjustment import Device
-from calibration.bundle import OPTICS_PARAMETERS
 from calibration.wall import undistorted
 from core.geometry import Optics, rotation_matrix, rotation_vector
 
@@ -105,6 +104,3 @@ def shifted(optics: Optics, change: Float[np.ndarray, "15"]) -> Optics:
         rotation_rad=rotation_vector(rotation_matrix((rx, ry, rz)) @ optics.rotation),
         distortion=(k1, k2, p1, p2, k3),
     )
-
-
-PARAMETERS = len(OPTICS_PARAMETERS)

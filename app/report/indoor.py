@@ -136,14 +136,6 @@ def indoor(solution: Solution, scene: Scene, asked: Asked = Asked()) -> Indoor:
     return Indoor(quantities, tuple(dict.fromkeys(missing)), tuple(_notes(solution, scene, asked, box_m)))
 
 
-def draught_percent(solution: Solution) -> np.ndarray:
-    """Draught rate on the vertices of a result [%]. Raises SettingError for one without velocity."""
-    if solution.velocity_m_s is None:
-        raise SettingError(NO_VELOCITY)
-    speed_m_s = np.linalg.norm(np.asarray(solution.velocity_m_s, np.float64), axis=-1)
-    return draught_rate_percent(np.asarray(solution.temperature_k, np.float64), speed_m_s)
-
-
 def told(quantity: Quantity) -> tuple[str, str, str]:
     """A line of the table as text: name, value, 95 % interval."""
     unit = f" {quantity.unit}" if quantity.unit else ""

@@ -45,8 +45,6 @@ class ExpectedFlow:
     grid: VertexGrid
     excess_k: Volume
     source: str
-    speed_rms_m_s: float | None = None
-    pressure_rms_m2_s2: float | None = None
     step_s: float | None = None
     cell_m: float | None = None
     turnover_ratio: float = 1.0
@@ -124,14 +122,10 @@ def _marched(problem: Problem) -> ExpectedFlow:
     model = coarse.model(prior.mean)
     step_s = float(longest_step_s(done.flow.last, model, MarchSettings().courant))
     solids = model.boundary.solids
-    speed = float(np.sqrt(np.mean(np.sum(np.square(done.fields.velocity_m_s), -1))))
-    pressure = done.fields.pressure_m2_s2
     return ExpectedFlow(
         VertexGrid(scene.room, shape),
         excess,
         f"the stated supply and walls, marched for {done.flow.model_s:.0f} s on {_COARSE.coarse_cells} cells an edge",
-        speed,
-        float(np.std(pressure)),
         step_s,
         min(coarse.grid.spacing_m),
         coarse.turnover_ratio,

@@ -32,7 +32,6 @@ class Seen:
     images: float
     boundary: float
     both: float
-    singular_values: Float[np.ndarray, " modes"]
     # What the images of the first view, of the first two, and so on fix.
     first_views: tuple[float, ...]
 
@@ -63,7 +62,6 @@ def seen(problem: Problem, flow: ExpectedFlow, signals: tuple[Signal, ...]) -> S
         share,
         _share(known, root),
         _share(np.concatenate([images, known]), root),
-        values,
         (*first_views, share),
     )
 

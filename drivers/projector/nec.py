@@ -8,7 +8,6 @@ Nothing is accepted while it turns on or off; a picture mute clears itself when 
 from drivers.projector.dialect import ABSENT, BUSY, DONE, FAILED, OTHER, Answer, AnswerKind, Request, Verb
 from drivers.projector.protocol import Capability, PowerState
 
-PORT = 7142
 _BASIC = bytes.fromhex("00BF00000102")
 _COMMANDS = {
     Verb.HELLO: _BASIC,

@@ -10,7 +10,6 @@ import re
 from drivers.projector.dialect import ABSENT, BUSY, DONE, FAILED, OTHER, Answer, AnswerKind, Request, Verb
 from drivers.projector.protocol import Capability, PowerState
 
-PORT = 4352
 _COMMANDS = {
     Verb.HELLO: "%1CLSS ?",
     Verb.POWER_ON: "%1POWR 1",

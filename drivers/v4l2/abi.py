@@ -19,16 +19,13 @@ BUF_FLAG_TSTAMP_SRC_MASK = 0x70000
 BUF_FLAG_TSTAMP_SRC_SOE = 0x10000
 FRMSIZE_TYPE_DISCRETE = 1
 FRMIVAL_TYPE_DISCRETE = 1
-CAP_TIMEPERFRAME = 0x1000
 CTRL_FLAG_DISABLED = 0x1
-CTRL_FLAG_GRABBED = 0x2
 CTRL_FLAG_READ_ONLY = 0x4
 CTRL_FLAG_INACTIVE = 0x10
 CTRL_FLAG_NEXT_CTRL = 0x80000000
 CTRL_TYPES = {1: "integer", 2: "boolean", 3: "menu", 4: "button", 8: "bitmask", 9: "integer menu"}
 
 CID_AUTO_WHITE_BALANCE = 0x98090C
-CID_EXPOSURE = 0x980911
 CID_AUTOGAIN = 0x980912
 CID_GAIN = 0x980913
 CID_HUE_AUTO = 0x980919
@@ -197,7 +194,6 @@ def _request(direction: int, number: int, kind: type) -> int:
 
 VIDIOC_QUERYCAP = _request(2, 0, Capability)
 VIDIOC_ENUM_FMT = _request(3, 2, FmtDesc)
-VIDIOC_G_FMT = _request(3, 4, Format)
 VIDIOC_S_FMT = _request(3, 5, Format)
 VIDIOC_REQBUFS = _request(3, 8, RequestBuffers)
 VIDIOC_QUERYBUF = _request(3, 9, Buffer)

@@ -60,7 +60,7 @@ def settings_text() -> str:
 class Here:
     """An engine whose workers are the real ones, run in this process when `work` lets them."""
 
-    name, is_local = "here", True
+    name = "here"
 
     def __init__(self) -> None:
         self.alive: dict[str, tuple[Launch, object, threading.Event]] = {}

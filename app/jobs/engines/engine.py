@@ -47,11 +47,6 @@ class Engine(Protocol):
         """The word that the configuration uses."""
         ...
 
-    @property
-    def is_local(self) -> bool:
-        """True when jobs use this machine's memory, so that admission must look at it."""
-        ...
-
     def probe(self) -> None:
         """Raise EngineError unless the engine is there and safe to use."""
         ...

@@ -18,7 +18,6 @@ class LocalEngine:
     """Workers as child processes in sessions of their own. The handle is `pid:start time`."""
 
     name = "local"
-    is_local = True
 
     def __init__(self, cache: Path) -> None:
         self._cache = cache

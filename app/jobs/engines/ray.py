@@ -29,7 +29,6 @@ class RayEngine:
     """Jobs of one Ray head. The handle is the submission id, which is the attempt's name."""
 
     name = "ray"
-    is_local = False
 
     def __init__(self, config: RayConfig) -> None:
         self._config = config

@@ -17,7 +17,6 @@ class SlurmEngine:
     """Batch jobs of the cluster that `sbatch` on this machine talks to. The handle is the job number."""
 
     name = "slurm"
-    is_local = False
 
     def __init__(self, config: SlurmConfig) -> None:
         self._config = config

@@ -25,7 +25,7 @@ DAYS_S = 172_800.0
 class Standing:
     """An engine whose workers stand still: the test writes what a worker would, and ends it."""
 
-    name, is_local = "standing", True
+    name = "standing"
 
     def __init__(self) -> None:
         self.alive: set[str] = set()
