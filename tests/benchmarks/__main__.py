@@ -11,7 +11,7 @@ def listing() -> str:
     lines = []
     for path in sorted(HERE.glob("[a-z]*.py")):
         about = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").split("\n\n")[0]
-        if path.stem != "options" and about:
+        if path.stem not in ("options", "served") and about:
             lines.append(f"{path.stem:16} {' '.join(about.split())}")
     return "\n".join(lines) + "\n"
 

@@ -21,10 +21,8 @@ import httpx
 import numpy as np
 import xarray as xr
 
-from app.api.factory import create_app
-from app.api.security.settings import Limits, new_token, service_config
-from app.api.server import listen, serving
 from app.experiment.folder import write_manifest
+from tests.benchmarks.served import unlimited
 from tests.benchmarks.two_hands import bodge_capture
 
 Break = Callable[[Path, random.Random], None]
@@ -196,16 +194,9 @@ def main() -> None:
     options = parser.parse_args()
     root = Path(tempfile.mkdtemp())
     try:
-        bound = listen("127.0.0.1", 0)
-        token = new_token()
-        limits = Limits(reads_per_s=1e9, writes_per_s=1e9, failures_per_s=1e9)
-        app = create_app(service_config(root, token, bound.getsockname()[1], limits=limits))
-        headers = {"Authorization": f"Bearer {token}"}
         with (
-            serving(app, bound) as port,
-            httpx.Client(
-                base_url=f"http://127.0.0.1:{port}", headers=headers, timeout=100, trust_env=False
-            ) as http,
+            unlimited(root) as service,
+            httpx.Client(base_url=service.url, headers=service.headers, timeout=100, trust_env=False) as http,
         ):
             started_s = time.perf_counter()
             counts = broken(http, root, options.files, options.seed)

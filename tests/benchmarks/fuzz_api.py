@@ -29,9 +29,7 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from app.api.factory import create_app
-from app.api.security.settings import Limits, new_token, service_config
-from app.api.server import listen, serving
+from tests.benchmarks.served import unlimited
 
 CHECKS = [
     status_code_conformance,
@@ -208,17 +206,12 @@ def main() -> None:
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     with tempfile.TemporaryDirectory() as folder:
-        bound = listen("127.0.0.1", 0)
-        token = new_token()
-        limits = Limits(reads_per_s=1e9, writes_per_s=1e9, failures_per_s=1e9)
-        app = create_app(service_config(Path(folder), token, bound.getsockname()[1], limits=limits))
-        with serving(app, bound) as port:
+        with unlimited(Path(folder)) as service:
             started_s = time.perf_counter()
-            headers = {"Authorization": f"Bearer {token}"}
+            url, headers, description = service.url, service.headers, service.app.openapi()
             counts = Counter[str]()
             if options.cases:
-                counts += fuzz(app.openapi(), f"http://127.0.0.1:{port}", headers, options.cases)
-            url = f"http://127.0.0.1:{port}"
+                counts += fuzz(description, url, headers, options.cases)
             made = httpx.post(
                 f"{url}/api/experiments",
                 json={"kind": "simulated", "camera_px": 64},
@@ -226,7 +219,7 @@ def main() -> None:
                 timeout=60,
             )
             name = made.json()["experiment"]
-            counts += extremes(app.openapi(), url, headers, options.extremes, experiment=name)
+            counts += extremes(description, url, headers, options.extremes, experiment=name)
             print(json.dumps({"wall_s": round(time.perf_counter() - started_s, 1), **counts}))
 
 

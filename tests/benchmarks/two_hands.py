@@ -22,12 +22,10 @@ from typing import Any
 
 import httpx
 
-from app.api.factory import create_app
-from app.api.security.settings import Limits, new_token, service_config
-from app.api.server import listen, serving
 from app.experiment.capture_files import BurstImage, write_image
 from app.experiment.folder import open_experiment, read_manifest, write_manifest
 from app.files.provenance import sha256
+from tests.benchmarks.served import unlimited
 
 MOST_MADE = 20
 
@@ -200,13 +198,9 @@ def main() -> None:
     options = parser.parse_args()
     root = Path(tempfile.mkdtemp())
     try:
-        bound = listen("127.0.0.1", 0)
-        token = new_token()
-        limits = Limits(reads_per_s=1e9, writes_per_s=1e9, failures_per_s=1e9)
-        app = create_app(service_config(root, token, bound.getsockname()[1], limits=limits))
-        with serving(app, bound) as port:
+        with unlimited(root) as service:
             started_s = time.perf_counter()
-            counts = rounds(f"http://127.0.0.1:{port}", token, root, options.rounds, options.hands)
+            counts = rounds(service.url, service.token, root, options.rounds, options.hands)
             wall_s = round(time.perf_counter() - started_s, 1)
         print(json.dumps({"benchmark": "two_hands", "hands": options.hands, "wall_s": wall_s, **counts}))
     finally:
