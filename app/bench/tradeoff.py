@@ -37,7 +37,7 @@ from core.solve.room import solve_room
 
 
 @dataclass(frozen=True)
-class Point:
+class TradePoint:
     """One place of the sweep; `preset` is the name that its settings have as a preset, if any."""
 
     method: str
@@ -49,19 +49,19 @@ class Point:
 
 
 POINTS = (
-    Point("draft", 16, None),
-    Point("draft", 24, None),
-    Point("draft", 48, "draft"),
-    Point("draft", 64, None),
-    Point("draft", 48, None, frames=10),
-    Point("draft", 48, None, frames=1000),
-    Point("draft", 48, "draft", light="projector"),
-    Point("grid", 32, "grid"),
-    Point("room", 24, None),
-    Point("room", 48, "standard"),
-    Point("room", 32, None),
-    Point("grid", 16, None),
-    Point("mlp", 0, None, information=("paper",)),
+    TradePoint("draft", 16, None),
+    TradePoint("draft", 24, None),
+    TradePoint("draft", 48, "draft"),
+    TradePoint("draft", 64, None),
+    TradePoint("draft", 48, None, frames=10),
+    TradePoint("draft", 48, None, frames=1000),
+    TradePoint("draft", 48, "draft", light="projector"),
+    TradePoint("grid", 32, "grid"),
+    TradePoint("room", 24, None),
+    TradePoint("room", 48, "standard"),
+    TradePoint("room", 32, None),
+    TradePoint("grid", 16, None),
+    TradePoint("mlp", 0, None, information=("paper",)),
 )
 # A network for a time that any other road would long have finished in.
 _NETWORK_S = 60.0
@@ -124,7 +124,7 @@ def sweep(volumes: list[Path], is_over: Callable[[], bool]) -> Iterator[dict[str
                     yield row
 
 
-def solved(point: Point, name: str, truth: RoomVolume, information: str) -> dict[str, Any] | None:
+def solved(point: TradePoint, name: str, truth: RoomVolume, information: str) -> dict[str, Any] | None:
     """One row; None where this method refuses what is known."""
     options = RigOptions(light=point.light, frames=point.frames)  # type: ignore[arg-type]
     made = synthetic_problem(truth, options, information, window_px=32, seed=1)  # type: ignore[arg-type]
@@ -150,7 +150,7 @@ def solved(point: Point, name: str, truth: RoomVolume, information: str) -> dict
     }  # fmt: skip
 
 
-def _solve(point: Point, problem: Problem) -> Solution:
+def _solve(point: TradePoint, problem: Problem) -> Solution:
     if point.method == "draft":
         return solve_draft(problem)
     if point.method == "grid":

@@ -14,7 +14,7 @@ from app.calibrate.pictures import OnPicture, Shooter
 from app.calibrate.response import calibrate_response
 from app.calibrate.steps import (
     Pictures,
-    Step,
+    StepOutcome,
     built,
     calibrate_camera,
     calibrate_projector,
@@ -23,7 +23,7 @@ from app.calibrate.steps import (
     put_to_use,
 )
 from app.errors import AirlensError, BadInputError
-from app.rig.stage import Stage, Task, TaskKind
+from app.rig.stage import Stage, StageTask, TaskKind
 from calibration.board import Board
 from calibration.graycode import frame_count
 from calibration.guide import CAMERA_PLAN, PROJECTOR_PLAN, WantedView, unmet
@@ -58,7 +58,11 @@ class GuidedCalibration:
     """One step of one rig's calibration. `wanted` says what to arrange; `take` takes the pictures of it."""
 
     def __init__(
-        self, calibration: CalibrationFolder, plan: LivePlan, stage: Stage, skipped: tuple[Task, ...] = ()
+        self,
+        calibration: CalibrationFolder,
+        plan: LivePlan,
+        stage: Stage,
+        skipped: tuple[StageTask, ...] = (),
     ) -> None:
         self._calibration, self._plan, self._stage = calibration, plan, stage
         self.skipped = skipped
@@ -71,7 +75,7 @@ class GuidedCalibration:
         """What was seen so far."""
         return self._calibration.collected(self._plan.camera)
 
-    def wanted(self) -> Task | None:
+    def wanted(self) -> StageTask | None:
         """The next thing to arrange; None when the plan is done."""
         return next((task for task in self._tasks() if task not in self.skipped), None)
 
@@ -115,7 +119,7 @@ class GuidedCalibration:
             StepName.response: self._take_response,
         }[self._plan.step](task, shooter)
 
-    def retake(self, name: str) -> Step | None:
+    def retake(self, name: str) -> StepOutcome | None:
         """Forget a view and its pictures. Raises BadInputError when there is none of that name."""
         record = self.record
         boards = () if record is None else record.boards
@@ -160,7 +164,7 @@ class GuidedCalibration:
         if step is StepName.wall and self._stage.display is not None and not lit:
             raise BadInputError("Gray code on the wall needs a calibrated projector; calibrate that first.")
 
-    def _tasks(self) -> list[Task]:
+    def _tasks(self) -> list[StageTask]:
         return {
             StepName.camera: self._camera_tasks,
             StepName.projector: self._projector_tasks,
@@ -168,34 +172,34 @@ class GuidedCalibration:
             StepName.response: self._response_tasks,
         }[self._plan.step]()
 
-    def _camera_tasks(self) -> list[Task]:
+    def _camera_tasks(self) -> list[StageTask]:
         return _board_tasks("board", CAMERA_PLAN, self.record, lambda board: True)
 
-    def _projector_tasks(self) -> list[Task]:
+    def _projector_tasks(self) -> list[StageTask]:
         return _board_tasks("place", PROJECTOR_PLAN, self.record, lambda board: bool(board.panel_px))
 
-    def _wall_tasks(self) -> list[Task]:
+    def _wall_tasks(self) -> list[StageTask]:
         record, tasks = self.record, []
         if self._stage.display is not None and not self._whole_wall():
-            tasks.append(Task("wall", "Leave the wall bare and the room dark; nobody in the picture."))
+            tasks.append(StageTask("wall", "Leave the wall bare and the room dark; nobody in the picture."))
         levelled = self._plan.placement.plumb_px or (record is not None and record.level is not None)
         if self._plan.board is not None and not levelled:
             tasks.append(
-                Task(
+                StageTask(
                     "level",
                     "Light the room; hold the board flat against the wall, level, in the picture's middle.",
                 )
             )
         return tasks
 
-    def _response_tasks(self) -> list[Task]:
+    def _response_tasks(self) -> list[StageTask]:
         tasks = []
         if not self._has_burst("dark"):
-            tasks.append(Task("dark", "Cover the lens."))
+            tasks.append(StageTask("dark", "Cover the lens."))
         whole = [n for n in self._response_names() if self._has_burst(n)]
         if len(whole) < len(self._response_names()):
             tasks.append(
-                Task("light", "Uncover the lens; steady light on the bare wall, nobody in the picture.")
+                StageTask("light", "Uncover the lens; steady light on the bare wall, nobody in the picture.")
             )
         return tasks
 
@@ -213,16 +217,16 @@ class GuidedCalibration:
         panel = self._stage.panel_px
         return panel is not None and len(list(self._folder.glob("graycode_*"))) == frame_count(*panel)
 
-    def _take_camera(self, task: Task, shooter: Shooter) -> tuple[str, ...]:
+    def _take_camera(self, task: StageTask, shooter: Shooter) -> tuple[str, ...]:
         file = shooter.one(self._folder / f"view_{_next(self._folder, 'view_'):02d}.png")
         return self._used(lambda: self._camera(file.name))
 
-    def _take_projector(self, task: Task, shooter: Shooter) -> tuple[str, ...]:
+    def _take_projector(self, task: StageTask, shooter: Shooter) -> tuple[str, ...]:
         name = f"place_{_next(self._folder, 'place_'):02d}"
         shooter.gray_code(self._folder / name)
         return self._used(lambda: self._projector(name))
 
-    def _take_wall(self, task: Task, shooter: Shooter) -> tuple[str, ...]:
+    def _take_wall(self, task: StageTask, shooter: Shooter) -> tuple[str, ...]:
         level = self._calibration.folder / "live-level" / "level.png"
         if task.kind == "wall":
             shooter.gray_code(self._folder)
@@ -230,7 +234,7 @@ class GuidedCalibration:
             level = shooter.one(level)
         return self._used(lambda: self._wall(level if task.kind == "level" else None))
 
-    def _take_response(self, task: Task, shooter: Shooter) -> tuple[str, ...]:
+    def _take_response(self, task: StageTask, shooter: Shooter) -> tuple[str, ...]:
         frames = self._plan.response_frames
         if task.kind == "dark":
             shooter.burst(self._folder / "dark", frames, dark=True)
@@ -256,23 +260,23 @@ class GuidedCalibration:
             with held(camera, own_s * factor) as (exposure, _):
                 shooter.burst(self._folder / f"exposure_{exposure.granted:.6g}", frames)
 
-    def _camera(self, name: str) -> Step:
+    def _camera(self, name: str) -> StepOutcome:
         pictures = Pictures(self._folder, name, self._full_scale())
         return calibrate_camera(self._calibration, self._plan.camera, pictures, self._board(), _quiet)
 
-    def _projector(self, name: str) -> Step:
+    def _projector(self, name: str) -> StepOutcome:
         pictures = Pictures(self._folder, f"{name}/*", self._full_scale())
         panel = self._stage.panel_px or (0, 0)
         return calibrate_projector(
             self._calibration, self._plan.camera, pictures, self._board(), panel, _quiet
         )
 
-    def _wall(self, level: Path | None) -> Step:
+    def _wall(self, level: Path | None) -> StepOutcome:
         bare = Pictures(self._folder, "graycode_*", self._full_scale()) if self._whole_wall() else None
         shown = None if level is None else (level, self._board())
         return calibrate_wall(self._calibration, self._plan.camera, bare, shown, self._plan.placement, _quiet)
 
-    def _used(self, step: Callable[[], Step]) -> tuple[str, ...]:
+    def _used(self, step: Callable[[], StepOutcome]) -> tuple[str, ...]:
         """What is wrong with the newest pictures; too few views yet is no fault of theirs."""
         try:
             self.issues = step().issues
@@ -291,10 +295,10 @@ class GuidedCalibration:
 
 def _board_tasks(
     kind: TaskKind, plan: tuple[WantedView, ...], record: Record | None, counts: Callable[[SeenBoard], bool]
-) -> list[Task]:
+) -> list[StageTask]:
     boards = () if record is None else tuple(b for b in record.boards if counts(b))
     left = list(plan) if record is None else unmet(plan, boards, record.camera_size_px)
-    return [Task(kind, view.text, view) for view in left]
+    return [StageTask(kind, view.text, view) for view in left]
 
 
 def _next(folder: Path, stem: str) -> int:

@@ -20,7 +20,7 @@ from app.experiment.folder import Experiment
 from app.rig.conditions import Conditions, conditions_of
 from app.rig.live_camera import LiveCamera
 from app.rig.open import open_camera, open_stage, panel_of
-from app.rig.stage import RealStage, Stage, Task, UnopenedStage
+from app.rig.stage import RealStage, Stage, StageTask, UnopenedStage
 from app.states import StateMachine
 from drivers.display import PatternDisplay
 from drivers.errors import DeviceBusyError, DeviceError
@@ -73,7 +73,7 @@ class GuideStatus:
     state: GuideState = GuideState.idle
     experiment: str | None = None
     step: StepName | None = None
-    wanted: Task | None = None
+    wanted: StageTask | None = None
     done: int = 0
     total: int = 0
     issues: tuple[str, ...] = ()
@@ -88,7 +88,7 @@ class CalibrationDesk:
     ) -> None:
         self._live, self._screen, self._tell = live, screen, tell
         self._status = GuideStatus()
-        self._skipped: dict[tuple[str, StepName], tuple[Task, ...]] = {}
+        self._skipped: dict[tuple[str, StepName], tuple[StageTask, ...]] = {}
         self._lock = threading.Lock()
         self._now: _Run | None = None
 
@@ -97,7 +97,7 @@ class CalibrationDesk:
         """The present state."""
         return self._status
 
-    def wanted(self, experiment: Experiment, plan: LivePlan) -> Task | None:
+    def wanted(self, experiment: Experiment, plan: LivePlan) -> StageTask | None:
         """What is to be arranged next; asks no device. Raises BadInputError where the step cannot begin."""
         return self._asked(experiment, plan).wanted()
 
@@ -119,7 +119,7 @@ class CalibrationDesk:
         self._tell_status()
         return self._status
 
-    def skip(self, experiment: Experiment, plan: LivePlan) -> Task | None:
+    def skip(self, experiment: Experiment, plan: LivePlan) -> StageTask | None:
         """Do without what is wanted until the service is started anew; return what is wanted then."""
         with self._lock:
             self._free()

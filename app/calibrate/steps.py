@@ -31,7 +31,7 @@ OnEvent = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Step:
+class StepOutcome:
     """What a step came to: the models so far (none: not enough yet), everything to retake, and what is missing.
 
     `missing` says that more pictures are wanted; those that were taken are not at fault.
@@ -56,7 +56,7 @@ class Pictures:
 
 def calibrate_camera(
     calibration: CalibrationFolder, camera: str, pictures: Pictures, board: Board, on_event: OnEvent
-) -> Step:
+) -> StepOutcome:
     """Find the board in every picture (of a Gray-code sequence: in white) and fit the camera."""
     files = find_images(pictures.folder, pictures.pattern)
     boards, issues = [], []
@@ -82,7 +82,7 @@ def calibrate_projector(
     board: Board,
     panel_px: tuple[int, int],
     on_event: OnEvent,
-) -> Step:
+) -> StepOutcome:
     """Decode every sequence, carry the board's corners to the panel, and fit camera and projector."""
     files = find_images(pictures.folder, pictures.pattern)
     boards, issues = [], []
@@ -107,7 +107,7 @@ def calibrate_wall(
     level: tuple[Path, Board] | None,
     placement: Placement,
     on_event: OnEvent,
-) -> Step:
+) -> StepOutcome:
     """The wall from Gray code on it, or from a board held flat against it; the world's axes and origin."""
     record = calibration.collected(camera)
     if record is None:
@@ -146,7 +146,7 @@ def _added(
     boards: list[tuple[tuple[int, int], SeenBoard]],
     issues: list[str],
     panel_px: tuple[int, int] | None = None,
-) -> Step:
+) -> StepOutcome:
     """Add the boards to the record and build; pictures of another size and repeated ones are named."""
     old = calibration.collected(camera)
     if not boards and old is None:
@@ -181,28 +181,28 @@ def model_of(record: Record) -> Model:
     return build(record)
 
 
-def built(calibration: CalibrationFolder, step: StepName, record: Record, issues: list[str]) -> Step:
+def built(calibration: CalibrationFolder, step: StepName, record: Record, issues: list[str]) -> StepOutcome:
     """Keep the record as that of a started step, and make its models as far as it allows."""
     calibration.save_started(step, record)
     return modelled(step, record, issues)
 
 
-def modelled(step: StepName, record: Record, issues: list[str]) -> Step:
+def modelled(step: StepName, record: Record, issues: list[str]) -> StepOutcome:
     """A step's models as far as its record allows; too few views yet are no issue."""
     try:
         model = model_of(record)
     except TooFewViewsError as error:
-        return Step(step, None, record, tuple(issues), str(error))
+        return StepOutcome(step, None, record, tuple(issues), str(error))
     except CalibrationError as error:
-        return Step(step, None, record, (*issues, str(error)))
+        return StepOutcome(step, None, record, (*issues, str(error)))
     missing = ""
     if record.panel_size_px is not None and model.pair is None:
         lit = sum(bool(b.panel_px) for b in record.boards)
         missing = f"{lit} boards carry usable Gray code; expected at least 3. Take more sequences."
-    return Step(step, model, record, tuple(issues), missing)
+    return StepOutcome(step, model, record, tuple(issues), missing)
 
 
-def put_to_use(calibration: CalibrationFolder, step: Step) -> Step:
+def put_to_use(calibration: CalibrationFolder, step: StepOutcome) -> StepOutcome:
     """Make a step's models those in use, if there are any."""
     if step.model is not None:
         calibration.put_to_use(step.model)

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from app.calibrate.steps import Step
+from app.calibrate.steps import StepOutcome
 from calibration.bundle import CalibratedOptics
 from calibration.intrinsics import Intrinsics
 from calibration.model import Model
 
 
-def summary(step: Step, seconds: float) -> dict[str, Any]:
+def summary(step: StepOutcome, seconds: float) -> dict[str, Any]:
     """The step as JSON values."""
     found: dict[str, Any] = {
         "complete": step.model is not None,

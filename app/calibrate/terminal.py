@@ -17,7 +17,7 @@ from app.calibrate.state import line_of
 from app.errors import BadInputError
 from app.experiment.folder import Experiment, open_experiment
 from app.rig.screens import open_screen
-from app.rig.stage import Task
+from app.rig.stage import StageTask
 from drivers.display import PatternDisplay
 
 # A wanted view that did not come out so often is left out, where nobody is there to decide.
@@ -55,7 +55,7 @@ def run_live(folder: Path, plan: LivePlan, options: LiveOptions) -> None:
 def _session(
     guided: GuidedCalibration, step: StepName, prompt: "_Prompt", stopped: Callable[[], bool]
 ) -> None:
-    tries: dict[Task, int] = {}
+    tries: dict[StageTask, int] = {}
     while (task := guided.wanted()) is not None and not stopped():
         if not prompt.ready(task, guided):
             continue
@@ -81,7 +81,7 @@ class _Prompt:
         self._simulated, self._every_s, self._stopped = simulated, every_s, stopped
         self.attended = not simulated and every_s is None
 
-    def ready(self, task: Task, guided: GuidedCalibration) -> bool:
+    def ready(self, task: StageTask, guided: GuidedCalibration) -> bool:
         """Whether to take the picture now; False after a skip, a retake, or the end."""
         typer.echo(task.text, err=True)
         if self._simulated:

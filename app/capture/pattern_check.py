@@ -9,7 +9,7 @@ from app.errors import BadInputError
 from app.experiment.folder import Experiment
 from app.rig.open import open_stage, panel_of
 from app.rig.screens import open_screen
-from app.rig.stage import Stage, Task
+from app.rig.stage import Stage, StageTask
 from core.pattern.make import make_pattern
 from drivers.pattern_check import check_pattern
 from drivers.verdict import Verdict
@@ -27,7 +27,7 @@ def check_projector(experiment: Experiment, screen: str, port: int, say: Callabl
     pattern = make_pattern(scene.light.pattern, panel[1], panel[0])
     picture = np.rint(255 * np.clip(pattern, 0, 1)).astype(np.uint8)
     with _stage(experiment, screen, port, say) as stage, stage.camera as camera:
-        stage.arrange(Task("light", "Leave the wall bare."))
+        stage.arrange(StageTask("light", "Leave the wall bare."))
         if stage.display is None:
             raise BadInputError("The rig has no screen to show a pattern with.")
         return check_pattern(stage.display, camera, picture)

@@ -44,7 +44,7 @@ from app.calibrate.page import write_page
 from app.calibrate.response import calibrate_response, drift_between
 from app.calibrate.steps import (
     Pictures,
-    Step,
+    StepOutcome,
     calibrate_camera,
     calibrate_projector,
     calibrate_wall,
@@ -312,7 +312,7 @@ def live(
     """Guide through a step on the rig, then print what it came to."""
     known = conditions_of(folder.settings(), known)
 
-    def step(say: Callable[[str], None]) -> Step:
+    def step(say: Callable[[str], None]) -> StepOutcome:
         run_live(folder.experiment, plan, options)
         record = folder.collected(plan.camera)
         if record is None:
@@ -323,14 +323,17 @@ def live(
 
 
 def from_pictures(
-    step: Callable[[Callable[[str], None]], Step], folder: CalibrationFolder, known: Conditions, as_json: bool
+    step: Callable[[Callable[[str], None]], StepOutcome],
+    folder: CalibrationFolder,
+    known: Conditions,
+    as_json: bool,
 ) -> None:
     """Do a step on pictures that are there; what they suffice for is in use at once."""
     run(lambda say: put_to_use(folder, step(say)), folder, known, as_json)
 
 
 def run(
-    step: Callable[[Callable[[str], None]], Step],
+    step: Callable[[Callable[[str], None]], StepOutcome],
     folder: CalibrationFolder,
     known: Conditions,
     as_json: bool,

@@ -34,11 +34,11 @@ def indoor(
 ) -> None:
     """Say what the found air means for people and ventilation: draught, PMV, air change, heat, with intervals."""
     from app.files.toml import to_plain
-    from app.report.indoor import Asked, indoor_of
+    from app.report.indoor import IndoorAsked, indoor_of
     from core.comfort import Occupant
     from core.occupied import OccupiedZone
 
-    asked = Asked(
+    asked = IndoorAsked(
         occupant=Occupant(clothing_clo=clothing, activity_met=met, relative_humidity=humidity / 100.0),
         zone=OccupiedZone(from_walls_m=from_walls),
         source_m=source,

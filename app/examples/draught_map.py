@@ -15,7 +15,7 @@ import numpy as np
 from app.errors import BadInputError
 from app.experiment.folder import finished, open_experiment
 from app.pipeline import reconstruct
-from app.report.figures import Plan, as_png, plans_figure
+from app.report.figures import FloorMap, as_png, plans_figure
 from app.report.finding import Finding, read_finding
 from core.occupied import HEAD_M, at_height
 
@@ -41,7 +41,7 @@ def draught_map(finding: Finding, picture: Path) -> str:
         for part in (draught.values, draught.low, draught.high)
     )
     plans = [
-        Plan(title, "%", solution.x_m, solution.y_m, values, "gouraud")
+        FloorMap(title, "%", solution.x_m, solution.y_m, values, "gouraud")
         for title, values in (("people bothered by draught", found), ("at most (95 %)", high))
     ]
     picture.write_bytes(as_png(plans_figure(plans)))

@@ -12,13 +12,13 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from app.files.toml_places import Path, Place, nearest
+from app.files.toml_places import KeyPlace, Path, nearest
 
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 
 
 def explained(
-    error: ValidationError, data: Any, kind: Any, source: str, places: Mapping[Path, Place] | None = None
+    error: ValidationError, data: Any, kind: Any, source: str, places: Mapping[Path, KeyPlace] | None = None
 ) -> str:
     """Every mistake in the order of the file, each at its place. `places` is empty where there is no text."""
     return in_file(said_of(error, data, kind), data, source, places or {}) or f"{source}: {error}"
@@ -54,7 +54,7 @@ def said_of(error: ValidationError, data: Any, kind: Any) -> list[Said]:
     return [Said(path, " or ".join(said), unknown) for (path, unknown), said in told.items()]
 
 
-def in_file(said: Sequence[Said], data: Any, source: str, places: Mapping[Path, Place]) -> str:
+def in_file(said: Sequence[Said], data: Any, source: str, places: Mapping[Path, KeyPlace]) -> str:
     """Mistakes in the order of the file, each at its line and column; empty for none."""
     sentences = [
         (
@@ -109,7 +109,7 @@ def _message(error: Any, kind: Any) -> str:
 
 
 def _place(
-    path: Path, message: str, unknown: bool, data: Any, places: Mapping[Path, Place]
+    path: Path, message: str, unknown: bool, data: Any, places: Mapping[Path, KeyPlace]
 ) -> tuple[int, int] | None:
     """Of an unknown key the key, of a wrong value the value, of a table the key that the message names."""
     table = _at(data, path)

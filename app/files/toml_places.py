@@ -23,14 +23,14 @@ _SCALAR = re.compile(r"[^,\]}#\n]+")
 
 
 @dataclass(frozen=True)
-class Place:
+class KeyPlace:
     """Line and column of a key (or a table's header), and of its value."""
 
     key: tuple[int, int]
     value: tuple[int, int]
 
 
-def places_of(text: str) -> Mapping[Path, Place]:
+def places_of(text: str) -> Mapping[Path, KeyPlace]:
     """The place of every key, table and item of an array, by its path; none at all of a text that is no TOML."""
     try:
         return _Reader(text).read()
@@ -38,7 +38,7 @@ def places_of(text: str) -> Mapping[Path, Place]:
         return {}
 
 
-def nearest(places: Mapping[Path, Place], path: Path) -> tuple[Path, Place] | None:
+def nearest(places: Mapping[Path, KeyPlace], path: Path) -> tuple[Path, KeyPlace] | None:
     """The place of a path, or of the last table above it that is written."""
     for length in range(len(path), 0, -1):
         if path[:length] in places:
@@ -50,10 +50,10 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self._text, self._at = text, 0
         self._lines = [0, *(match.end() for match in re.finditer("\n", text))]
-        self._places: dict[Path, Place] = {}
+        self._places: dict[Path, KeyPlace] = {}
         self._arrays: dict[Path, int] = {}
 
-    def read(self) -> dict[Path, Place]:
+    def read(self) -> dict[Path, KeyPlace]:
         table: Path = ()
         self._blank()
         while self._at < len(self._text):
@@ -157,7 +157,7 @@ class _Reader:
         self._at = found.end() if found else self._at
 
     def _note(self, path: Path, key: int, value: int) -> None:
-        self._places.setdefault(path, Place(self._line_of(key), self._line_of(value)))
+        self._places.setdefault(path, KeyPlace(self._line_of(key), self._line_of(value)))
 
     def _line_of(self, at: int) -> tuple[int, int]:
         line = self._text.count("\n", 0, at)

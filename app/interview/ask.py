@@ -3,11 +3,11 @@
 from collections.abc import Generator, Sequence
 from typing import Any
 
-from app.interview.conversation import Again, Question, Told
+from app.interview.conversation import Again, Question, Remark
 from app.interview.tree import Path, Tree, changed, put, sentence_at, value_at, with_unit
 from app.setup.units import UNITS, unit_of
 
-Asked = Generator[Question | Told | Again, str, Any]
+Asked = Generator[Question | Remark | Again, str, Any]
 # What leaves a field open that may be open.
 NOTHING = "none"
 

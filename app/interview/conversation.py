@@ -30,7 +30,7 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Told:
+class Remark:
     """Something to know before the next question."""
 
     text: str
@@ -45,7 +45,7 @@ class Again:
 
 
 # Yields what is asked and told, is sent each answer, and returns what all answers make.
-Flow = Generator[Question | Told | Again, str, dict[str, Any]]
+Flow = Generator[Question | Remark | Again, str, dict[str, Any]]
 
 
 class Person(Protocol):
@@ -108,7 +108,7 @@ def _walk(talk: Flow, kept: list[tuple[str, str]], person: Person, draft: Path) 
             if isinstance(item, Again):
                 person.refuse(None, item.reason)
                 raise _BackError(item.questions)
-            if isinstance(item, Told):
+            if isinstance(item, Remark):
                 if given == len(kept):
                     person.say(item.text)
                 item = next(talk)

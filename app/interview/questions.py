@@ -11,7 +11,7 @@ from functools import cache
 from app.errors import BadInputError
 from app.files.toml import parse, toml_data
 from app.interview.ask import NOTHING, Asked, ask_choice, ask_either, ask_field, ask_number
-from app.interview.conversation import Flow, Question, Told
+from app.interview.conversation import Flow, Question, Remark
 from app.interview.room import ask_room
 from app.interview.tree import Tree, put, value_at
 from app.rig.inventory import CameraChoice, found_cameras
@@ -41,7 +41,7 @@ class Inventory:
 def questions(inventory: Inventory) -> Flow:
     """Ask everything; return the answers as `answers.toml` holds them."""
     tree = yield from _ask_devices(inventory.cameras)
-    yield Told(
+    yield Remark(
         "Measure from the room's lower left front corner, as the camera sees it: x to the right, y to the "
         "patterned wall, z up. A number without a unit has the unit of the answer shown."
     )
@@ -56,7 +56,7 @@ def _ask_devices(cameras: Sequence[CameraChoice]) -> Asked:
     usable = {one.device or one.kind: one for one in cameras if not one.error}
     for one in cameras:
         if one.error:
-            yield Told(f"{one.device}  {one.name}: {one.error}")
+            yield Remark(f"{one.device}  {one.name}: {one.error}")
     name = yield from ask_choice("Camera", list(usable), "", [one.name for one in usable.values()])
     chosen = usable[name]
     if chosen.kind != "simulated":
@@ -126,7 +126,7 @@ def _ask_address(tree: Tree, inventory: Inventory) -> Asked:
     path = ("projector", "url")
     if where in devices:
         found = inventory.who(where)
-        yield Told(f"{where}: {f'{found.name}, {found.power}' if found else 'nobody answers'}.")
+        yield Remark(f"{where}: {f'{found.name}, {found.power}' if found else 'nobody answers'}.")
         put(tree, path, found.url if found else f"escvp21:{where}")
     if where != NOTHING:
         yield from ask_field(
@@ -153,7 +153,7 @@ def _ask_place(tree: Tree) -> Asked:
         yield from ask_field(
             tree, ("camera", "distance"), "Distance of the camera to the patterned wall", "m"
         )
-    yield Told(picture_told(settings_of(parse(tree, Answers, ANSWERS_FILE)).scene))
+    yield Remark(picture_told(settings_of(parse(tree, Answers, ANSWERS_FILE)).scene))
     yield from ask_field(tree, ("camera", "exposure"), "Exposure", "ms", can_be_open=True)
     tree["camera"].setdefault("frames", 100)
     yield from ask_number(tree, ("camera", "frames"), "Frames that are averaged")

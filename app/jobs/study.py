@@ -32,7 +32,7 @@ class Spread:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Point:
+class Combination:
     """One job of a study: the settings that vary, and the numbers in its result (none while it has none)."""
 
     job: str
@@ -47,7 +47,7 @@ class Summary:
 
     group: Group
     states: Mapping[str, int]
-    points: tuple[Point, ...]
+    points: tuple[Combination, ...]
     spread: Mapping[str, Spread]
 
 
@@ -129,7 +129,7 @@ def _varying(jobs: Sequence[Job]) -> list[str]:
     return [n for n in names if len({json.dumps(job.settings.get(n)) for job in jobs}) > 1]
 
 
-def _point(ledger: Ledger, job: Job, varying: Sequence[str]) -> Point:
+def _point(ledger: Ledger, job: Job, varying: Sequence[str]) -> Combination:
     numbers: dict[str, float] = {}
     if job.state is JobState.done:
         # A result that was deleted or damaged since has no numbers; the others have theirs.
@@ -138,10 +138,10 @@ def _point(ledger: Ledger, job: Job, varying: Sequence[str]) -> Point:
             found = json.loads(path.read_text(encoding="utf-8"))["summary"]
             numbers = {n: float(v) for n, v in found.items() if isinstance(v, int | float)}
     settings = {name: job.settings.get(name) for name in varying}
-    return Point(job=job.id, state=job.state, settings=settings, numbers=numbers)
+    return Combination(job=job.id, state=job.state, settings=settings, numbers=numbers)
 
 
-def _spreads(points: Sequence[Point]) -> dict[str, Spread]:
+def _spreads(points: Sequence[Combination]) -> dict[str, Spread]:
     names = dict.fromkeys(name for point in points for name in point.numbers)
     return {n: _spread([point.numbers[n] for point in points if n in point.numbers]) for n in names}
 

@@ -25,7 +25,7 @@ _MARK = "#ff7f0e"
 
 
 @dataclass(frozen=True)
-class Plan:
+class FloorMap:
     """A map seen from above: values at vertices (gouraud) or between the edges of cells (flat)."""
 
     title: str
@@ -159,7 +159,7 @@ def volume_figure(solution: Solution, values: np.ndarray, label: str, highest: f
     return figure
 
 
-def plans_figure(plans: Sequence[Plan]) -> Figure:
+def plans_figure(plans: Sequence[FloorMap]) -> Figure:
     """Maps seen from above, side by side, each with its own scale from zero."""
     figure = Figure(figsize=(13, 4.6), layout="constrained")
     axes = figure.subplots(1, len(plans), squeeze=False)[0]

@@ -48,7 +48,7 @@ Figures = dict[str, float]
 
 
 @dataclass(frozen=True)
-class Asked:
+class IndoorAsked:
     """For whom, where, and how finely; `source_m` is a place whose pollution is to be carried off."""
 
     occupant: Occupant = field(default_factory=Occupant)
@@ -110,14 +110,14 @@ NO_VELOCITY = (
 )
 
 
-def indoor_of(folder: Path, result: Path | None = None, asked: Asked = Asked()) -> Indoor:
+def indoor_of(folder: Path, result: Path | None = None, asked: IndoorAsked = IndoorAsked()) -> Indoor:
     """The figures of an experiment's newest, or the given, result. Raises BadInputError, SettingError."""
     experiment = open_experiment(folder)
     solution = read_result((result or experiment.latest_result()) / "result.nc")
     return indoor(solution, experiment.settings.scene, asked)
 
 
-def indoor(solution: Solution, scene: Scene, asked: Asked = Asked()) -> Indoor:
+def indoor(solution: Solution, scene: Scene, asked: IndoorAsked = IndoorAsked()) -> Indoor:
     """The figures of a result. Raises SettingError for a zone or a source that is not in the room."""
     box_m = asked.zone.box(scene.room)
     _check_source(asked, scene)
@@ -155,7 +155,7 @@ def age_of_air(solution: Solution, scene: Scene, cells: int = CELLS) -> AirChang
     return air_change(_tracer(found_flow(solution.filled(), opening_patches(scene)), cells))
 
 
-def _sampled(solution: Solution, scene: Scene, asked: Asked, found: Figures) -> list[Figures]:
+def _sampled(solution: Solution, scene: Scene, asked: IndoorAsked, found: Figures) -> list[Figures]:
     """The figures of each sample; ages differ from the found one's as they do on their own, larger cells."""
     length_m = LENGTH_SHARE * float(np.prod(scene.room.size_m)) ** (1 / 3)
     coarse = _figures(solution, scene, asked, SAMPLE_CELLS, _ignored)
@@ -170,7 +170,7 @@ def _sampled(solution: Solution, scene: Scene, asked: Asked, found: Figures) -> 
 
 
 def _figures(
-    solution: Solution, scene: Scene, asked: Asked, cells: int, lacks: Callable[[str], object]
+    solution: Solution, scene: Scene, asked: IndoorAsked, cells: int, lacks: Callable[[str], object]
 ) -> Figures:
     figures = _in_the_zone(solution, scene, asked)
     if solution.velocity_m_s is not None:
@@ -182,7 +182,7 @@ def _figures(
     return figures
 
 
-def _in_the_zone(solution: Solution, scene: Scene, asked: Asked) -> Figures:
+def _in_the_zone(solution: Solution, scene: Scene, asked: IndoorAsked) -> Figures:
     low_m, high_m = asked.zone.box(scene.room)
     axes = (solution.x_m, solution.y_m, solution.z_m)
     there = _thinned(inside(axes, low_m, high_m) & solution.air)
@@ -221,7 +221,7 @@ def _heights(solution: Solution, there: np.ndarray) -> Figures:
     }
 
 
-def _of_the_flow(solution: Solution, scene: Scene, asked: Asked, cells: int) -> Figures:
+def _of_the_flow(solution: Solution, scene: Scene, asked: IndoorAsked, cells: int) -> Figures:
     solution = solution.filled()
     found = found_flow(solution, opening_patches(scene))
     air = exchange(found, solution.temperature_k, scene)
@@ -303,7 +303,9 @@ def _jet_name(key: str) -> tuple[str, str]:
     return f"supply {number}, {told}", "m"
 
 
-def _notes(solution: Solution, scene: Scene, asked: Asked, box_m: tuple[Vector3, Vector3]) -> Iterable[str]:
+def _notes(
+    solution: Solution, scene: Scene, asked: IndoorAsked, box_m: tuple[Vector3, Vector3]
+) -> Iterable[str]:
     (x0, y0, z0), (x1, y1, z1) = box_m
     yield (
         f"Occupied zone: {asked.zone.from_walls_m:g} m from the walls, x {x0:g} to {x1:g}, y {y0:g} to {y1:g}, "
@@ -327,7 +329,7 @@ def _notes(solution: Solution, scene: Scene, asked: Asked, box_m: tuple[Vector3,
         )
 
 
-def _check_source(asked: Asked, scene: Scene) -> None:
+def _check_source(asked: IndoorAsked, scene: Scene) -> None:
     if asked.source_m is not None:
         for name, at, low, high in zip(
             "xyz", asked.source_m, scene.room.lower_m, scene.room.upper_m, strict=True

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from app.report.figures import Plan, plans_figure
+from app.report.figures import FloorMap, plans_figure
 from app.report.finding import Finding
 from core.occupied import HEAD_M, at_height
 from core.setting import SettingError
@@ -28,5 +28,5 @@ def maps_figure(finding: Finding) -> Figure:
         values = getattr(kept[name], part) if name in kept else None
         if values is not None:
             plane = at_height(np.asarray(values, np.float64), solution.z_m, HEAD_M)
-            plans.append(Plan(title, unit, solution.x_m, solution.y_m, plane, "gouraud"))
+            plans.append(FloorMap(title, unit, solution.x_m, solution.y_m, plane, "gouraud"))
     return plans_figure(plans)

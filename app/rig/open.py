@@ -14,7 +14,7 @@ from app.rig.inventory import found_cameras
 from app.rig.practice_room import PracticeRoom
 from app.rig.projectors import open_real_projector
 from app.rig.rendered import VIEWS_APART, AirState, moving_pictures, seen_picture
-from app.rig.stage import RealStage, Stage, Task
+from app.rig.stage import RealStage, Stage, StageTask
 from calibration.board import Board
 from core.geometry import Optics
 from core.scene import ProjectedPattern, Scene
@@ -143,7 +143,7 @@ class PracticeStage:
             name=f"simulated {scene.views[view].name}",
         )
 
-    def arrange(self, task: Task) -> None:
+    def arrange(self, task: StageTask) -> None:
         """Move the board, cover the lens."""
         self._room.arrange(task)
 

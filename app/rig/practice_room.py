@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float32
 
-from app.rig.stage import Task, board_size_m
+from app.rig.stage import StageTask, board_size_m
 from calibration.board import Board
 from calibration.guide import WantedView, pose_of
 from calibration.simulated_pictures import Look, Sheet, look
@@ -36,9 +36,9 @@ class PracticeRoom:
         self._covered, self._by_room = False, False
         self._look: Look | None = None
         self._seen: Float32[np.ndarray, "rows cols"] | None = None
-        self.arrange(Task("light", ""))
+        self.arrange(StageTask("light", ""))
 
-    def arrange(self, task: Task) -> None:
+    def arrange(self, task: StageTask) -> None:
         """Do what the task says, as a careful operator would."""
         sheets = [self._wall()]
         if self._board is not None and task.kind in ("board", "place") and task.view is not None:

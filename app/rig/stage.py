@@ -20,7 +20,7 @@ TaskKind = Literal["board", "place", "wall", "level", "dark", "light"]
 
 
 @dataclass(frozen=True)
-class Task:
+class StageTask:
     """One thing to arrange before the next pictures, in the operator's words; `view` only for a board."""
 
     kind: TaskKind
@@ -52,7 +52,7 @@ class Stage(Protocol):
         """Whether `arrange` moves things: a simulated rig. A real one waits for its operator."""
         ...
 
-    def arrange(self, task: Task) -> None:
+    def arrange(self, task: StageTask) -> None:
         """Bring about what the task says, where that is possible."""
         ...
 
@@ -66,7 +66,7 @@ class RealStage:
     panel_px: tuple[int, int] | None = None
     arranges_itself: bool = False
 
-    def arrange(self, task: Task) -> None:
+    def arrange(self, task: StageTask) -> None:
         """Nothing: the operator does it."""
 
 
@@ -83,7 +83,7 @@ class UnopenedStage:
         """There is none. Raises AirlensError."""
         raise AirlensError("The camera of this rig is not open. Connect it first.")
 
-    def arrange(self, task: Task) -> None:
+    def arrange(self, task: StageTask) -> None:
         """Nothing: nobody is there."""
 
 

@@ -39,7 +39,7 @@ EXPOSURE_MANUAL = 1
 EXPOSURE_UNIT_S = 100e-6
 
 
-class Capability(ctypes.Structure):
+class DeviceCapability(ctypes.Structure):
     """`struct v4l2_capability`."""
 
     _fields_ = (
@@ -192,7 +192,7 @@ def _request(direction: int, number: int, kind: type) -> int:
     return direction << 30 | ctypes.sizeof(kind) << 16 | ord("V") << 8 | number
 
 
-VIDIOC_QUERYCAP = _request(2, 0, Capability)
+VIDIOC_QUERYCAP = _request(2, 0, DeviceCapability)
 VIDIOC_ENUM_FMT = _request(3, 2, FmtDesc)
 VIDIOC_S_FMT = _request(3, 5, Format)
 VIDIOC_REQBUFS = _request(3, 8, RequestBuffers)

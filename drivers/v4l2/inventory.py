@@ -68,14 +68,14 @@ def describe_device(path: Path) -> DeviceDescription | None:
     )
 
 
-def query(node: Node) -> abi.Capability:
+def query(node: Node) -> abi.DeviceCapability:
     """Return the driver's identity and capabilities."""
-    about = abi.Capability()
+    about = abi.DeviceCapability()
     node.call(abi.VIDIOC_QUERYCAP, about)
     return about
 
 
-def captures(about: abi.Capability) -> bool:
+def captures(about: abi.DeviceCapability) -> bool:
     """Return whether this very node (not another of the same device) streams video in."""
     own = about.device_caps if about.capabilities & abi.CAP_DEVICE_CAPS else about.capabilities
     return bool(own & abi.CAP_VIDEO_CAPTURE and own & abi.CAP_STREAMING)

@@ -20,7 +20,7 @@ from drivers.simulated import CameraFault, SimulatedCamera, VirtualClock
 from drivers.simulated.projector.engine import ProjectorFault, SimulatedProjector
 from drivers.simulated.projector.escvp21 import EscVp21Twin
 from drivers.simulated.projector.hosts import LoopPort
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.state import TwinState
 from tests.app.rig.test_live_camera import SCENE
 from tests.browser.conftest import Opens, Station, snapshot
 
@@ -87,7 +87,7 @@ def test_a_projector_that_falls_silent(station: Station, opens: Opens):
     quiet = [True]
     clock = VirtualClock()
     twin = SimulatedProjector(
-        EscVp21Twin(ProjectorState(clock)), lambda _: ProjectorFault.SILENCE if quiet[0] else None
+        EscVp21Twin(TwinState(clock)), lambda _: ProjectorFault.SILENCE if quiet[0] else None
     )
     services = station.app.state.services
     source = services.projector.report.source

@@ -15,7 +15,7 @@ from app.calibrate.state import state_of
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
 from app.rig.conditions import Conditions
-from app.rig.stage import Task
+from app.rig.stage import StageTask
 from calibration.board import Board
 from calibration.record import Placement
 
@@ -139,7 +139,7 @@ def _resource(given: Services, experiment: Experiment, plan: LivePlan) -> GuideR
     )
 
 
-def _wanted(task: Task) -> WantedResource:
+def _wanted(task: StageTask) -> WantedResource:
     view = task.view
     return WantedResource(
         kind=task.kind,

@@ -28,7 +28,7 @@ from core.rays.visibility import wall_points
 from core.result import Departures, Solution
 from core.scene import Scene
 from core.setting import SettingError
-from core.solve.sequence.likelihood import Posterior, Seen, likeliest
+from core.solve.sequence.likelihood import ModesPosterior, SeenModes, likeliest
 from core.solve.sequence.modes import Axes, Modes, longest
 from core.watch import Watch
 
@@ -88,7 +88,7 @@ def _seen(
     slope_per_k: Float[np.ndarray, "nx ny nz"],
     bursts: Sequence[ShiftMeasurement],
     watch: Watch,
-) -> Seen:
+) -> SeenModes:
     """What one view's windows say of the modes."""
     side = _side(scene, view, modes, bursts[0])
     bursts = [joined(burst, side) for burst in bursts]
@@ -107,7 +107,7 @@ def _seen(
         some = modes.some(start, start + _BATCH)
         shifts_px = _shifts(rays, some.fields(modes.grid.axes_m) * slope_per_k)
         columns[:, start : start + some.count] = np.stack([white(one) for one in shifts_px], axis=1)
-    return Seen(
+    return SeenModes(
         (columns.T @ columns).astype(np.float64),
         columns.T.astype(np.float64) @ data,
         float((data**2).sum()),
@@ -189,7 +189,7 @@ def _spread_k(mean: Solution) -> float:
     return max((float(np.var(kelvin)) + unknown) ** 0.5, 1e-3)
 
 
-def _deviation(modes: Modes, found: Posterior, axes_m: Axes) -> Float[np.ndarray, "nx ny nz"]:
+def _deviation(modes: Modes, found: ModesPosterior, axes_m: Axes) -> Float[np.ndarray, "nx ny nz"]:
     """One sigma of a departure on vertices."""
     share = (_VERTICES / np.prod([len(axis) for axis in axes_m])) ** (1 / 3)
     coarse = [np.linspace(axis[0], axis[-1], max(2, int(min(share, 1.0) * len(axis)))) for axis in axes_m]

@@ -33,7 +33,7 @@ _LEAST, _MOST, _SIZES, _ROUNDS = 1e-3, 5.0, 500, 4
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenModes:
     """What the windows say of the modes, whitened: A^T A, A^T d for each burst, sum |d|^2, and D."""
 
     normal: Float[np.ndarray, "modes modes"]
@@ -41,9 +41,9 @@ class Seen:
     square: float
     count: int
 
-    def and_(self, other: "Seen") -> "Seen":
+    def and_(self, other: "SeenModes") -> "SeenModes":
         """Both views' windows."""
-        return Seen(
+        return SeenModes(
             self.normal + other.normal,
             self.score + other.score,
             self.square + other.square,
@@ -52,7 +52,7 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Posterior:
+class ModesPosterior:
     """The likeliest field and what the bursts say under it.
 
     `std_k` (expected) and `length_m` are the field's, `noise` the factor on the variance of the shifts, `weights` the
@@ -66,7 +66,7 @@ class Posterior:
     root: Float[np.ndarray, "modes modes"]
 
 
-def likeliest(modes: Modes, seen: Seen, spread_k: float) -> Posterior:
+def likeliest(modes: Modes, seen: SeenModes, spread_k: float) -> ModesPosterior:
     """The likeliest length, size and noise, and the posterior there; `spread_k` is that of T in the mean room [K]."""
     shortest_m, longest_m = 2.0 / modes.finest_per_m, _LONGEST * min(modes.box.size_m)
     # A field that shows as much as the noise does.
@@ -86,11 +86,14 @@ def likeliest(modes: Modes, seen: Seen, spread_k: float) -> Posterior:
     std_k, noise = _expected(np.maximum(values, 0.0), score, seen, spread_k)
     left = 1.0 / (1.0 + std_k**2 / noise * np.maximum(values, 0.0))
     weights = root @ ((std_k**2 / noise * left)[:, None] * score)
-    return Posterior(std_k, length_m, noise, weights, std_k * root * left**0.5)
+    return ModesPosterior(std_k, length_m, noise, weights, std_k * root * left**0.5)
 
 
 def _expected(
-    values: Float[np.ndarray, " modes"], score: Float[np.ndarray, "modes bursts"], seen: Seen, spread_k: float
+    values: Float[np.ndarray, " modes"],
+    score: Float[np.ndarray, "modes bursts"],
+    seen: SeenModes,
+    spread_k: float,
 ) -> tuple[float, float]:
     """The root of the expected sigma^2, and tau there: where the pictures say nothing, sigma is what is believed.
 
@@ -118,7 +121,7 @@ def _expected(
 class _Tried:
     """The likelihood at a length and a ratio (both as logarithms)."""
 
-    def __init__(self, modes: Modes, seen: Seen, at: Float[np.ndarray, "2"]) -> None:
+    def __init__(self, modes: Modes, seen: SeenModes, at: Float[np.ndarray, "2"]) -> None:
         length_m, self.ratio = (float(one) for one in np.exp(at))
         self.size = modes.amplitudes(length_m)
         matrix = self.ratio * self.size[:, None] * seen.normal * self.size

@@ -3,7 +3,7 @@
 from drivers.projector.nec import with_checksum
 from drivers.projector.protocol import PowerState
 from drivers.simulated.projector.responder import Reply
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.state import TwinState
 
 _IDS = b"\x01\x20"
 _POWER = {PowerState.STANDBY: 0x00, PowerState.ON: 0x04, PowerState.WARMING: 0x04, PowerState.COOLING: 0x05}
@@ -15,7 +15,7 @@ class NecTwin:
     error = with_checksum(b"\xa2\x00" + _IDS + b"\x02\x02\x0f")
     news = with_checksum(b"\x20\x99" + _IDS + b"\x01\x00")
 
-    def __init__(self, state: ProjectorState) -> None:
+    def __init__(self, state: TwinState) -> None:
         self.state = state
 
     def greeting(self) -> bytes:

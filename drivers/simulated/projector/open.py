@@ -14,7 +14,7 @@ from drivers.simulated.projector.hosts import LoopPort
 from drivers.simulated.projector.nec import NecTwin
 from drivers.simulated.projector.optoma import OptomaTwin
 from drivers.simulated.projector.pjlink import PjLinkTwin
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.state import TwinState
 
 
 @dataclass(frozen=True)
@@ -46,5 +46,5 @@ def link_to(
 def open_twin(dialect: str, clock: Clock, warm_up_s: float, cool_down_s: float) -> ProjectorLink:
     """Return a simulated projector of that dialect, whose lamp takes those times."""
     twin = TWINS[dialect]
-    state = ProjectorState(clock, warm_up_s, cool_down_s, source=twin.sources[0], sources=twin.sources)
+    state = TwinState(clock, warm_up_s, cool_down_s, source=twin.sources[0], sources=twin.sources)
     return link_to(SimulatedProjector(twin.responder(state)), dialect, clock)

@@ -4,7 +4,7 @@ import hashlib
 
 from drivers.projector.protocol import PowerState
 from drivers.simulated.projector.responder import CrCommands, Reply
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.state import TwinState
 
 _POWER = {PowerState.STANDBY: "0", PowerState.ON: "1", PowerState.COOLING: "2", PowerState.WARMING: "3"}
 
@@ -15,7 +15,7 @@ class PjLinkTwin(CrCommands):
     error = b"%1POWR=ERR4\r"
     news = b"%2LKUP=00:11:22:33:44:55\r"
 
-    def __init__(self, state: ProjectorState, password: str = "", salt: str = "498e4a67") -> None:
+    def __init__(self, state: TwinState, password: str = "", salt: str = "498e4a67") -> None:
         super().__init__(state)
         self._password, self._salt, self._trusted = password, salt, not password
 

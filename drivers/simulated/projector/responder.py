@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.state import TwinState
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Reply:
 class Responder(Protocol):
     """A dialect from the projector's side. `error` is its way to refuse, `news` what it says unasked."""
 
-    state: ProjectorState
+    state: TwinState
     error: bytes
     news: bytes
 
@@ -38,7 +38,7 @@ class Responder(Protocol):
 class CrCommands:
     """What the dialects share whose commands end with CR, and who wait to be spoken to."""
 
-    def __init__(self, state: ProjectorState) -> None:
+    def __init__(self, state: TwinState) -> None:
         self.state = state
 
     def greeting(self) -> bytes:

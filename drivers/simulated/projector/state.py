@@ -7,7 +7,7 @@ from drivers.projector.protocol import PowerState
 
 
 @dataclass
-class ProjectorState:
+class TwinState:
     """The machine behind the plug. Times in seconds on `clock`."""
 
     clock: Clock

@@ -12,7 +12,7 @@ from app.experiment.folder import ExperimentSettings, create_experiment, write_m
 from app.experiment.results import write_result
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.report.finding import read_finding
-from app.report.indoor import NAMES, Asked, Quantity, age_of_air, indoor, told
+from app.report.indoor import NAMES, IndoorAsked, Quantity, age_of_air, indoor, told
 from app.report.page import render_report
 from core.comfort import Occupant
 from core.geometry import Box, looking_along_y
@@ -42,13 +42,15 @@ def layered(cells: int = 20, deviation: float | None = None) -> Solution:
     )
 
 
-def values(solution: Solution, scene: Scene = PLUG_ROOM, asked: Asked = Asked()) -> dict[str, Quantity]:
+def values(
+    solution: Solution, scene: Scene = PLUG_ROOM, asked: IndoorAsked = IndoorAsked()
+) -> dict[str, Quantity]:
     return {quantity.key: quantity for quantity in indoor(solution, scene, asked).quantities}
 
 
 @pytest.fixture(scope="module")
 def plain():
-    return values(layered(), asked=Asked(source_m=(1.05, 1.0, 1.0)))
+    return values(layered(), asked=IndoorAsked(source_m=(1.05, 1.0, 1.0)))
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +121,7 @@ def test_the_same_result_gives_the_same_table(deviating):
 
 
 def test_clothes_and_humidity_move_the_vote():
-    cold = Asked(occupant=Occupant(clothing_clo=0.3))
+    cold = IndoorAsked(occupant=Occupant(clothing_clo=0.3))
     assert values(layered(), asked=cold)["pmv"].value < values(layered())["pmv"].value - 0.5
 
 
@@ -140,12 +142,12 @@ def test_still_air_says_why_it_has_no_age():
 
 def test_a_source_beside_the_room_is_refused():
     with pytest.raises(SettingError, match="z of the source"):
-        indoor(layered(), PLUG_ROOM, Asked(source_m=(1.0, 1.0, 5.0)))
+        indoor(layered(), PLUG_ROOM, IndoorAsked(source_m=(1.0, 1.0, 5.0)))
 
 
 def test_a_zone_that_is_all_wall_is_refused():
     with pytest.raises(SettingError, match="smaller distance"):
-        indoor(layered(), PLUG_ROOM, Asked(zone=OccupiedZone(from_walls_m=1.5)))
+        indoor(layered(), PLUG_ROOM, IndoorAsked(zone=OccupiedZone(from_walls_m=1.5)))
 
 
 def test_the_packaged_rooms_age_at_the_outlet_is_volume_over_flow():

@@ -5,7 +5,7 @@ from drivers.projector.open import DIALECTS as SPOKEN
 from drivers.simulated import VirtualClock
 from drivers.simulated.projector.engine import SimulatedProjector
 from drivers.simulated.projector.open import TWINS, link_to
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.state import TwinState
 
 DIALECTS = {name: (SPOKEN[name], twin.responder, twin.sources) for name, twin in TWINS.items()}
 
@@ -13,7 +13,7 @@ DIALECTS = {name: (SPOKEN[name], twin.responder, twin.sources) for name, twin in
 def make_twin(name, faults=lambda _: None, *, clock=None, seed=0, **options):
     """Return a simulated projector of that dialect."""
     _, responder, sources = DIALECTS[name]
-    state = ProjectorState(clock or VirtualClock(), source=sources[0], sources=sources)
+    state = TwinState(clock or VirtualClock(), source=sources[0], sources=sources)
     return SimulatedProjector(responder(state, **options), faults, seed=seed)
 
 

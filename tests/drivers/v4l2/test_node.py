@@ -15,7 +15,7 @@ from drivers.v4l2.node import explain
 @pytest.mark.parametrize(
     ("structure", "size"),
     [
-        (abi.Capability, 104),
+        (abi.DeviceCapability, 104),
         (abi.FmtDesc, 64),
         (abi.Format, 208),
         (abi.RequestBuffers, 20),

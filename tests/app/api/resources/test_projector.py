@@ -16,7 +16,7 @@ from drivers.simulated import VirtualClock
 from drivers.simulated.projector.engine import ProjectorFault, SimulatedProjector
 from drivers.simulated.projector.escvp21 import EscVp21Twin
 from drivers.simulated.projector.hosts import LoopPort
-from drivers.simulated.projector.state import ProjectorState
+from drivers.simulated.projector.state import TwinState
 from tests.app.api.conftest import Live
 
 
@@ -62,7 +62,7 @@ def test_a_projector_that_falls_silent_is_asked_on_until_it_speaks(client: Clien
     clock = VirtualClock()
     silent = [True]
     twin = SimulatedProjector(
-        EscVp21Twin(ProjectorState(clock)), lambda _: ProjectorFault.SILENCE if silent[0] else None
+        EscVp21Twin(TwinState(clock)), lambda _: ProjectorFault.SILENCE if silent[0] else None
     )
     services = live.app.state.services
     services.projector.open("room", lambda: ProjectorLink(EscVp21(), LoopPort(twin), clock=clock))
