@@ -20,7 +20,7 @@ from core.watch import Watch
 
 
 class Solve(Protocol):
-    """A road from a problem to the air: a solver with its settings."""
+    """A solver with its settings."""
 
     def __call__(self, problem: Problem, watch: Watch = Watch()) -> Solution:
         """Solve; `watch` is told of it, may stop it, and keeps what it can go on from."""

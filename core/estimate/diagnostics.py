@@ -12,7 +12,7 @@ from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.scene import Driving, Heater, Inlet
 
-# In one room of twenty an entry is called wrong that is as right as it was stated to be.
+# One room in twenty has an entry called wrong that is as right as its stated deviation says.
 _FALSE_ALARMS = 0.05
 _INTERVAL = 1.96
 # Missing heat is reported above this share of the heat that the supplies bring.

@@ -176,7 +176,7 @@ def _deviation(
     a, c, b = _SHARES[name]
     if float(analysis.prior.std.log_viscosity.max()) > 0:
         c *= _GUESSED_VISCOSITY[name]
-    # The room's own size, by its own signal: what is left tells what the room lacks, not what it has.
+    # Over the room's own signal: a room that lacks a heater is small where it is wrong.
     shares = (a, c * seen.share_left, b * seen.left_over_own)
     represented = Represented(between[0], between[1], scale, shares)
     return deviation(stated, moved, analysis.posterior.covariance, represented, extra)

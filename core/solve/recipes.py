@@ -26,7 +26,7 @@ def grid_settings(problem: Problem) -> GridSettings:
 def paper_settings(problem: Problem, steps: int = PAPER_STEPS) -> MlpSolveSettings:
     """The published recipe: AdaBelief, batches of 8192, 5000 and 4096, 64 vertices.
 
-    Rays go through the network; there are its three losses and no belief about smoothness.
+    Rays go through the network; there are its three losses and no prior for smoothness.
     """
     return MlpSolveSettings(
         regime=regime_for(problem),

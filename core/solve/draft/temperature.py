@@ -55,7 +55,7 @@ from core.solve.draft.temperature_system import (
 from core.view_frame import looked_along
 from core.watch import Row, Watch
 
-# Thinner air than at this temperature is none: without a limit 0 K comes next, and then less.
+# The hottest air that a step may reach: its refractivity is nearly zero, and a step further would make it negative.
 _HOTTEST_K = 5000.0
 _NOT_AIR = (
     "Some of the shifts are larger than air could make: the temperature is cut at 5000 K. Something else moved; "

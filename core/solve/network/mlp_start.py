@@ -1,4 +1,4 @@
-"""A network that begins as another road's solution, such as a marched room's."""
+"""A network that begins as another solver's solution, such as a marched room's."""
 
 import equinox as eqx
 import jax
