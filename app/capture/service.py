@@ -76,7 +76,7 @@ OUTCOMES = {
 
 @dataclass(frozen=True)
 class DeskStatus:
-    """The capture that runs, or the last one: `done` of `total` frames, the how manieth of `bursts`."""
+    """The capture that runs, or the last one: `done` of `total` frames, and which of `bursts` it is."""
 
     state: DeskState = DeskState.idle
     experiment: str | None = None
