@@ -87,6 +87,8 @@ def reconstruct(
     preset = resolved(preset, known.scene)
     solve = preset_called(preset)
     check_data_term(preset, known.scene)
+    for role in ("reference", "flow"):
+        experiment.latest_capture(role)  # what is missing is told before any time is promised
     # A sequence takes longer than the preset alone, of which the promise is.
     under_way.begin(task_in(experiment, known, preset), afresh=not watch.store and not sequence)
     on_stage("read the captures", "read", promised=under_way.said)

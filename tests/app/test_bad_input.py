@@ -12,6 +12,7 @@ from app.pipeline import reconstruct
 from core.geometry import Box, looking_along_y
 from core.scene import CameraNoise, FixedTexture, Inlet, Outlet, Patch, Scene, View
 from core.setting import SettingError
+from core.watch import Watch
 from drivers.burst import CapturePlan
 from drivers.simulated import SimulatedCamera
 from tests.drivers.scenes import pattern
@@ -39,9 +40,13 @@ def test_a_saturated_capture(tmp_path):
         reconstruct(captured(tmp_path, level=3.5), "draft")
 
 
-def test_no_reference_image(tmp_path):
+def test_no_reference_image_is_told_before_a_time_is_promised(tmp_path):
+    rows = []
     with pytest.raises(BadInputError, match="no finished reference capture"):
-        reconstruct(captured(tmp_path, roles=("flow",)), "draft")
+        reconstruct(
+            captured(tmp_path, roles=("flow",)), "draft", watch=Watch(lambda row, _: rows.append(row))
+        )
+    assert not any(row.get("promised") for row in rows)
 
 
 def test_a_wall_outside_the_view_which_sees_nothing_of_the_room(tmp_path):
