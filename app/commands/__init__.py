@@ -15,7 +15,7 @@ COMMANDS = {
     ),
     "devices": (
         "app.commands.devices",
-        "List cameras with their formats and controls, serial ports, and screens.",
+        "List cameras with their formats and controls, and serial ports.",
     ),
     "preview": (
         "app.commands.preview",

@@ -16,7 +16,7 @@ def devices(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     full: Annotated[bool, typer.Option("--full", help="List sizes, rates and controls too.")] = False,
 ) -> None:
-    """List cameras with their formats and controls, serial ports, and screens."""
+    """List cameras with their formats and controls, and serial ports."""
     from app.rig.ports import found_ports
     from drivers.aravis import list_aravis
     from drivers.v4l2 import list_devices
@@ -41,10 +41,10 @@ def devices(
         typer.echo(f"{one.device}  {one.name}  {one.address}  {one.error}".rstrip())
         for name in one.formats:
             typer.echo(f"    {name:<8}{one.width_px}x{one.height_px}")
+    if not cameras and not vision:
+        typer.echo(
+            "No camera was found. Plug one in; on Linux it is /dev/video*, one of GigE or USB3 Vision needs "
+            "libaravis-0.8-0. A simulated rig needs none: airlens demo."
+        )
     for port in ports:
         typer.echo(f"{port['device']}  serial port  {port['description']}")
-    if not cameras and not vision and not ports:
-        typer.echo(
-            "No camera and no serial port was found. Plug one in; on Linux a camera is /dev/video*. "
-            "A simulated rig needs none: airlens demo."
-        )
