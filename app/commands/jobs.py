@@ -138,6 +138,11 @@ def list_jobs(
     if as_json:
         typer.echo(json.dumps([plain(job) for job in found], indent=1))
         return
+    if not found:
+        typer.echo(
+            "There are no jobs here. Queue one: airlens jobs submit reconstruct --experiment EXPERIMENT"
+        )
+        return
     table = Table("id", "title", "state", "progress", "attempt", "device", "reason")
     for job in found:
         share = f"{job.progress:.0%}"

@@ -124,10 +124,10 @@ class Experiment:
 def open_experiment(folder: Path) -> Experiment:
     """Read an experiment folder. Raises BadInputError."""
     path = folder / SETTINGS_FILE
+    if folder.is_file():
+        raise BadInputError(f"{folder} is a file. Give the folder that it is in: {folder.parent}")
     if not path.exists():
-        raise BadInputError(
-            f"There is no {path}. Give the folder of an experiment; `airlens simulate` makes one."
-        )
+        raise BadInputError(f"There is no {path}. Give the folder of an experiment; `airlens new` makes one.")
     with reading(path, "Correct the file."):
         return parse_experiment(folder, path.read_bytes())
 

@@ -29,9 +29,7 @@ class Strict(BaseModel):
 def read_toml(path: Path, kind: type[T]) -> T:
     """Parse a TOML file into `kind`. Raises BadInputError that names every wrong key or value."""
     if not path.exists():
-        raise BadInputError(
-            f"There is no {path}. Give the folder of an experiment; `airlens simulate` makes one."
-        )
+        raise BadInputError(f"There is no {path}. Give the folder of an experiment; `airlens new` makes one.")
     with reading(path, "Correct the file at that place."):
         text = path.read_text(encoding="utf-8")
     return from_toml(text, kind, source=str(path))

@@ -107,7 +107,7 @@ def preset(name: str) -> Solve:
     try:
         return PRESETS[name]
     except KeyError:
-        raise BadInputError(f"There is no preset {name!r}; known: {', '.join(PRESETS)}.") from None
+        raise BadInputError(f"There is no preset {name!r}; known: {', '.join((AUTO, *PRESETS))}.") from None
 
 
 def check_data_term(name: str, scene: Scene) -> None:

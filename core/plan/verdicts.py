@@ -124,8 +124,9 @@ def moving(air: Fluctuation | None) -> list[str]:
     wished = "; ".join(
         f"to {error_k:g} K, {_time(air.seconds_for(error_k))}" for error_k in air.round_errors_k()
     )
+    stays_s = float(f"{air.time_s:.1g}")
     return [
-        f"The air moves: T departs from its mean by {air.std_k:.2g} K (rms), for some {air.time_s:.1g} s at a time. "
+        f"The air moves: T departs from its mean by {air.std_k:.2g} K (rms), for some {stays_s:g} s at a time. "
         f"How long to average (capture flow --bursts, --every-s) to know the mean {wished}."
     ]
 

@@ -64,3 +64,9 @@ def test_boundary_information_that_contradicts_itself(tmp_path):
 def test_a_camera_without_noise(wrong):
     with pytest.raises(SettingError, match="expected full_well_e > 0"):
         CameraNoise(**wrong)
+
+
+def test_the_file_of_an_experiment_in_place_of_its_folder(tmp_path):
+    folder = captured(tmp_path, roles=())
+    with pytest.raises(BadInputError, match=r"experiment\.toml is a file\. Give the folder that it is in"):
+        reconstruct(folder / "experiment.toml", "draft")

@@ -87,6 +87,16 @@ def test_a_flow_says_how_far_the_border_moved(experiment):
     assert "+2.0" in far.advice
 
 
+@pytest.mark.parametrize(("exposure_s", "good"), [(0.02, True), (0.01, False)])
+def test_a_flow_says_whether_its_exposure_is_the_references(experiment, exposure_s, good):
+    camera = make_camera()
+    take(camera, experiment, CapturePlan(role="reference", frames=2, exposure_s=0.02))
+    taken = take(camera, experiment, CapturePlan(role="flow", frames=2, exposure_s=exposure_s))
+    (told,) = [v for v in taken.burst.verdicts if v.name == "exposure_s of the reference"]
+    assert told.good is good
+    assert told.value == pytest.approx(abs(exposure_s / 0.02 - 1.0), abs=1e-3)
+
+
 def test_the_lamps_journal_tells_how_long_it_has_been_on(experiment, tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     now_s = datetime.now(UTC).timestamp()

@@ -103,6 +103,8 @@ def test_work_that_nobody_counted_is_promised_only_where_it_was_done_before(figu
     unknown = Task("standard", programs="r", scene="s", pixels=1e6, work=None)
     assert promise(unknown, (), SPEEDS).wall_s is None
     assert promise(unknown, (ran(figures, unknown, solve=80.0),), SPEEDS).stages["solve"] == 80.0
+    beside = tuple(ran(figures, unknown, solve=seconds) for seconds in (80.0, 900.0, 70.0))
+    assert promise(unknown, beside, SPEEDS).stages["solve"] == 80.0
     elsewhere = Task("standard", programs="r", scene="other", pixels=1e6, work=None)
     assert promise(elsewhere, (ran(figures, unknown, solve=80.0),), SPEEDS).wall_s is None
 

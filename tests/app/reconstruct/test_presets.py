@@ -37,5 +37,5 @@ def test_auto_marches_the_room_where_supply_and_walls_are_stated(parts, expected
 
 
 def test_an_unknown_preset_is_refused_with_the_known_ones():
-    with pytest.raises(BadInputError, match="known: draft"):
+    with pytest.raises(BadInputError, match="known: auto, draft"):
         preset("best")
