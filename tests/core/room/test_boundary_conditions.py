@@ -64,6 +64,18 @@ def test_openings_keep_their_flow_and_momentum_on_any_grid():
         assert momentum == pytest.approx(0.25 * patch_m2, rel=1e-5)
 
 
+def test_a_faster_supply_brings_turbulence_as_its_speed_says():
+    layout = room_layout(scene(SUPPLY, EXHAUST), room_grid(ROOM, 8))
+    stated = parameters(1, 0)
+    twice = dataclasses.replace(stated, inlet_log_flow=jnp.full(1, np.log(2.0)))
+    slow, fast = (boundary(layout, given).walls[0][0] for given in (stated, twice))
+
+    # k goes as the speed squared, epsilon = C k^1.5 / length as its cube.
+    for name, ratio in (("normal_m_s", 2.0), ("turbulent_energy_m2_s2", 4.0), ("dissipation_m2_s3", 8.0)):
+        assert float(getattr(slow, name).max()) > 0
+        np.testing.assert_allclose(getattr(fast, name), ratio * getattr(slow, name), rtol=1e-5)
+
+
 def test_a_grid_puts_faces_on_the_edges_of_openings_where_that_takes_few_more_cells():
     box = Box(lower_m=(-1.2, -1.5, 0.0), upper_m=(2.9, 1.5, 3.0))
 
