@@ -40,7 +40,7 @@ from app.api.models.screen import PatternName, ScreenResource
 from app.api.models.shift import ShiftResource
 from app.api.models.uploads import Upload
 from app.errors import AirlensError, BadInputError
-from app.experiment.plan import Plan
+from app.experiment.plan import PlacesLine, Plan
 from app.files.durable import write_durably
 
 T = TypeVar("T")
@@ -233,7 +233,7 @@ class Client:
         return self._ask(ExperimentResource, "POST", "/experiments/from-answers", body)
 
     def answers(self, experiment: str) -> AnswersResource:
-        """Return the answers that an experiment was made from."""
+        """Return an experiment's rig and room as answers: as they were entered, else read from its scene."""
         return self._ask(AnswersResource, "GET", f"/experiments/{experiment}/answers")
 
     def change_answers(
@@ -255,6 +255,10 @@ class Client:
     def plan(self, experiment: str) -> Plan:
         """Return the newest plan; a job of kind `plan` makes one."""
         return self._ask(Plan, "GET", f"/experiments/{experiment}/plan")
+
+    def places(self, job: str) -> PlacesLine:
+        """Return what a finished job of kind `places` found: the signal from other places of the camera."""
+        return self._ask(PlacesLine, "GET", f"/jobs/{job}/places")
 
     def guide(self, experiment: str, step: StepText = "camera") -> GuideResource:
         """Return what a guided calibration wants next, and how good it is."""

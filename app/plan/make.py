@@ -39,6 +39,7 @@ from core.plan.shift_noise import shift_noise
 from core.plan.signal import Signal, other_light, shift_map, signal
 from core.plan.verdicts import blindness, broken, moving, verdict
 from core.problem import Problem
+from core.scene import Scene
 from core.view_frame import facing, turn_of
 
 OnStage = Callable[[str], object]
@@ -193,11 +194,18 @@ def _averaging(moves: Fluctuation | None) -> AveragingLine | None:
     )
 
 
+def places_of(scene: Scene) -> PlacesLine:
+    """What the scene's first camera, which looks at y_max, would see of the expected flow from other places."""
+    return _map_of_places(scene, 0, expected_flow(Problem(scene, ())))
+
+
 def _places(problem: Problem, view: int, flow: ExpectedFlow) -> PlacesLine | None:
     """None of a view of another wall: the map is of the floor before y_max."""
     scene = problem.scene
-    if scene.views[view].wall != "y_max":
-        return None
+    return _map_of_places(scene, view, flow) if scene.views[view].wall == "y_max" else None
+
+
+def _map_of_places(scene: Scene, view: int, flow: ExpectedFlow) -> PlacesLine:
     found = place_map(scene, view, flow)
     return PlacesLine(
         x_m=found.x_m.tolist(),

@@ -3,13 +3,12 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from app.errors import BadInputError
 from app.experiment.folder import (
-    SETTINGS_FILE,
     TRUTH_FILE,
     Experiment,
-    ExperimentSettings,
     create_experiment,
     new_folder,
     open_experiment,
@@ -17,16 +16,19 @@ from app.experiment.folder import (
 )
 from app.files.durable import durable_folder, write_durably, write_text
 from app.files.reading import reading
-from app.files.toml import parse, toml_data
+from app.files.toml import parse, to_toml, toml_data
 from app.files.toml_errors import in_file
 from app.files.toml_places import places_of
 from app.setup.answers import Answers
+from app.setup.change import changed_settings
 from app.setup.mistakes import mistakes_in
-from app.setup.scene import SENSORS_FILE, sensor_table, settings_of
+from app.setup.readback import ReadBack, asked_view, listed_tables, read_back, scene_back
+from app.setup.scene import SENSORS_FILE, described, sensor_table, settings_of
 from app.volume.file import read_volume
 from app.volume.sample import SAMPLE_ROOM
 from app.volume.scene import room_box
 from core.geometry import Vector3
+from core.setting import SettingError
 
 ANSWERS_FILE = "answers.toml"
 # What `truth` names the packaged room by.
@@ -69,48 +71,58 @@ def add_experiment(parent: Path, text: str, truth: Path | None) -> Experiment:
     return open_experiment(new_folder(parent, "room", lambda folder: _fill(folder, answers, text, truth)))
 
 
-def answers_text(experiment: Experiment) -> str:
-    """The answers that an experiment was made from. Raises BadInputError where it was made without."""
+def answers_of(experiment: Experiment) -> ReadBack:
+    """The rig and the room as answers: as they were entered, else read from the scene, whoever wrote it.
+
+    Raises BadInputError where no camera looks at y_max, or a file is broken.
+    """
+    found = read_back(experiment)
     path = experiment.folder / ANSWERS_FILE
-    if not path.is_file():
-        raise BadInputError(
-            f"The rig and the room of {experiment.folder.name} were not entered as answers, so they cannot be edited "
-            f"here: change them in {(experiment.folder / SETTINGS_FILE).resolve()}."
-        )
-    with reading(path, "Correct the file."):
-        return path.read_text(encoding="utf-8")
+    if path.is_file():
+        with reading(path, "Correct the file."):
+            data = toml_data(path.read_text(encoding="utf-8"), ANSWERS_FILE)
+        if not mistakes_in(data) and _still_say(experiment, parse(data, Answers, ANSWERS_FILE)):
+            return replace(found, answers=data)
+    return found
 
 
-def change_answers(experiment: Experiment, text: str) -> Experiment:
+def _still_say(experiment: Experiment, entered: Answers) -> bool:
+    """Whether nothing that answers say was changed by hand in experiment.toml since they were entered."""
+    settings, corner_m = experiment.settings, experiment.settings.scene.room.lower_m
+    file = experiment.folder / SENSORS_FILE
+    kept = file.read_text(encoding="utf-8") if file.is_file() else ""
+    described_again = scene_back(described(entered, corner_m)).answers
+    return described_again == scene_back(settings).answers and kept == sensor_table(entered, corner_m)
+
+
+def change_answers(experiment: Experiment, data: dict[str, Any]) -> Experiment:
     """Give an experiment other answers; who calls holds its lock. Raises BadInputError.
 
-    What hangs on the wall stays as it is while camera, projector and pattern are answered as before: a print is
-    not made anew because a radiator was moved. The board, the notes and what was taken and computed stay too.
+    Only what is answered otherwise changes. What no answer says, what hangs on the wall while camera, projector and
+    pattern are answered as before, the board, the notes, and what was taken and computed stay.
     """
-    before, after = read_answers(answers_text(experiment), ANSWERS_FILE), read_answers(text, ANSWERS_FILE)
+    text, corner_m = to_toml(data), experiment.settings.scene.room.lower_m
+    before = parse(answers_of(experiment).answers, Answers, ANSWERS_FILE)
+    after = read_answers(text, ANSWERS_FILE)
     if before.camera.truth != after.camera.truth:
         raise BadInputError(
             "camera.truth: the room that a simulated camera looks at cannot be changed. Make a new experiment."
         )
-    # The room's own copy: a path in a folder from elsewhere is not followed.
-    corner_m = corner_of(experiment.folder / TRUTH_FILE if after.camera.truth else None)
-    settings = _merged(experiment.settings, settings_of(after, corner_m), before, after)
-    _write_sensors(experiment.folder, after, corner_m)
+    listed = listed_tables(experiment)
+    try:
+        settings = changed_settings(
+            experiment.settings,
+            (before, after),
+            (described(before, corner_m), described(after, corner_m)),
+            asked_view(experiment.settings.scene),
+            listed,
+        )
+    except SettingError as error:
+        raise BadInputError(str(error)) from error
+    if (before.thermometer, before.anemometer) != (after.thermometer, after.anemometer):
+        _write_sensors(experiment.folder, after, corner_m)
     write_text(experiment.folder / ANSWERS_FILE, text)
     return save_settings(experiment.folder, settings)
-
-
-def _merged(
-    old: ExperimentSettings, new: ExperimentSettings, before: Answers, after: Answers
-) -> ExperimentSettings:
-    same = (before.camera, before.projector, before.pattern_seed) == (
-        after.camera,
-        after.projector,
-        after.pattern_seed,
-    )
-    scene = replace(new.scene, light=old.scene.light) if same else new.scene
-    rig = old.rig if same else new.rig.model_copy(update={"board": old.rig.board})
-    return new.model_copy(update={"information": old.information, "rig": rig, "scene": scene})
 
 
 def _fill(folder: Path, answers: Answers, text: str, truth: Path | None) -> None:

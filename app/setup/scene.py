@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 from app.errors import BadInputError
 from app.experiment.folder import TRUTH_FILE, ExperimentSettings
@@ -46,6 +45,11 @@ def settings_of(answers: Answers, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> Experi
     wrong = contradictions(answers)
     if wrong:
         raise BadInputError("; ".join(f"{field_name(one.path)}: {one.message}" for one in wrong))
+    return described(answers, corner_m)
+
+
+def described(answers: Answers, corner_m: Vector3) -> ExperimentSettings:
+    """The same of answers that may contradict one another: a scene that somebody wrote may. Raises BadInputError."""
     room = Box(lower_m=corner_m, upper_m=_moved(answers.room, corner_m))
     try:
         optics = _optics(answers.camera, room)
@@ -210,14 +214,6 @@ def object_of(item: ObjectAnswer, number: int, corner_m: Vector3 = (0.0, 0.0, 0.
         return ready
     std_w = ready.power_std_w if item.heat_deviation is None else item.heat_deviation
     return replace(ready, thermal="power", power_w=power_w, power_std_w=std_w)
-
-
-def answer_of(box: RoomObject, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> dict[str, Any]:
-    """A box that passes no heat as an answer, its place measured from the room's corner."""
-    (x0, y0, z0), (x1, y1, _) = box.lower_m, box.upper_m
-    foot_m = (0.5 * (x0 + x1) - corner_m[0], 0.5 * (y0 + y1) - corner_m[1], z0 - corner_m[2])
-    position, size = ([f"{value:.12g} m" for value in place] for place in (foot_m, box.size_m))
-    return {"kind": "box", "position": position, "size": size}
 
 
 def _inlet(item: SupplyAnswer, room: Box) -> Inlet:

@@ -3,8 +3,9 @@
     python -m tests.benchmarks.page_speed
 
 load: packed bytes of the first load and of the room in 3D; live: frames/s of a 1.3 Mpx picture and the age of a frame
-when it is on the canvas; room in 3D: frames/s of a 64^3 field with 64 moving streamlines at 960 x 540; curves: 80,000
-points told by a job, time to draw an update. Rows: `results/page_speed.jsonl`.
+when it is on the canvas; room in 3D: frames/s of a 64^3 field with 64 moving streamlines at 960 x 540, and of the
+room while it is turned, each frame waited for; curves: 80,000 points told by a job, time to draw an update. Rows:
+`results/page_speed.jsonl`.
 """
 
 import argparse
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Locator, Page, sync_playwright
 
 from app.experiment.folder import write_manifest
 from app.experiment.results import write_result
@@ -29,10 +30,16 @@ from tests.browser.conftest import CHROMIUM, FLAGS, Station
 from tests.browser.test_page import packed_bytes
 
 POINTS = 80_000
+TURNS = 12
 FINISH = """canvas => {
   const gl = canvas.getContext("webgl2");
   gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
 }"""
+
+FINISH_NEXT = f"""async canvas => {{
+  await new Promise(requestAnimationFrame);
+  ({FINISH})(canvas);
+}}"""
 
 
 def tell(what: str, **numbers: Any) -> None:
@@ -85,10 +92,26 @@ def volume(page: Page, seconds: float) -> None:
         first, began_s = int(inner.get_attribute("data-moved") or 0), time.monotonic()
         time.sleep(seconds)
         # Reading a pixel waits until everything is really drawn.
-        page.locator(".volume canvas").evaluate(FINISH)
+        room = page.locator(".volume canvas:not(.strokes)")
+        room.evaluate(FINISH)
         last, passed_s = int(inner.get_attribute("data-moved") or 0), time.monotonic() - began_s
         tell("room in 3D", shown=what, edge=64, streamlines=64, width_px=960, height_px=540,
-             frames_per_s=round((last - first) / passed_s, 1))  # fmt: skip
+             frames_per_s=round((last - first) / passed_s, 1),
+             turned_per_s=round(turned_per_s(page, room), 1))  # fmt: skip
+
+
+def turned_per_s(page: Page, room: Locator) -> float:
+    box = room.bounding_box()
+    assert box
+    page.mouse.move(box["x"] + 300, box["y"] + 300)
+    page.mouse.down()
+    began_s = time.monotonic()
+    for turn in range(TURNS):
+        page.mouse.move(box["x"] + 300 + 10 * turn, box["y"] + 300)
+        room.evaluate(FINISH_NEXT)
+    passed_s = time.monotonic() - began_s
+    page.mouse.up()
+    return TURNS / passed_s
 
 
 def load() -> None:

@@ -171,7 +171,9 @@ def test_the_large_board_of_a_simulated_rig_is_printed_over_sheets(station: Stat
     snapshot(page, "board-over-sheets")
 
 
-def test_a_room_that_was_not_entered_on_the_page_says_where_it_is_edited(station: Station, opens: Opens):
+def test_a_room_that_was_not_entered_on_the_page_is_edited_and_keeps_what_is_not_asked(
+    station: Station, opens: Opens
+):
     with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
         name = client.create_experiment(camera_px=64).experiment
         sent = next(one for one in client.templates() if one.template == "sample").answers
@@ -180,17 +182,22 @@ def test_a_room_that_was_not_entered_on_the_page_says_where_it_is_edited(station
     choice = page.get_by_role("combobox", name="Experiment")
     choice.select_option(name)
     page.get_by_role("button", name="Edit room").click()
-    file = station.app.state.services.folders.open(name).folder / "experiment.toml"
-    expect(page.locator("main")).to_contain_text(f"cannot be edited here: change them in {file.resolve()}.")
-    expect(page.get_by_role("alert")).to_have_count(0)
-    expect(page.get_by_role("radiogroup", name="Camera")).to_have_count(0)
-    expect(page.locator("button.next")).to_have_text("Calibrate")
+    page.get_by_text("Not asked here, and kept as it is").click()
+    expect(page.locator("main")).to_contain_text("boundary/plane_x_min.npz: temperature and velocity known")
     snapshot(page, "room-not-entered")
+    supply = page.get_by_role("group", name="supply 1").first
+    supply.get_by_label("Temperature", exact=True).fill("29 C")
+    page.locator("button.next", has_text="Change the room").click()
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+    scene = station.app.state.services.folders.open(name).settings.scene
+    (inlet,) = (one for one in scene.boundary if one.kind == "inlet")
+    assert inlet.temperature_k == pytest.approx(302.15)
+    assert any(one.kind == "plane_field" for one in scene.boundary)
     # Another experiment, whose room was entered, opens in the same place.
+    page.get_by_role("button", name="Edit room").click()
     choice.select_option(entered)
     expect(page.get_by_label("Name", exact=True)).to_have_value("Entered here")
-    expect(page.locator("button.next")).to_have_text("Change the room")
-    expect(page.locator("main")).not_to_contain_text("cannot be edited here")
+    expect(page.locator("main")).not_to_contain_text("Not asked here")
 
 
 def test_a_mistake_is_told_at_its_field_while_it_is_typed_and_can_be_undone(station: Station, opens: Opens):

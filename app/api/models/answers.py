@@ -109,7 +109,9 @@ class CheckResource(Strict):
 
 
 class AnswersResource(Strict):
-    """The answers of an experiment; `revision` goes into the `If-Match` of a change."""
+    """The answers of an experiment; `unsaid` tells what they leave out and a change leaves as it is; `revision` goes
+    into the `If-Match` of a change."""
 
     answers: dict[str, Any]
+    unsaid: list[str]
     revision: str

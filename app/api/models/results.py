@@ -46,8 +46,8 @@ class FieldResource(Strict):
 class FoundResource(Strict):
     """Something before the wall that was not stated, and the box that would hide as much.
 
-    `solved`: the air was solved with it. `answer` is the object to add to the experiment's answers; None where its
-    room was not entered as answers. `entry` states the box in experiment.toml.
+    `solved`: the air was solved with it. `answer` is the object to add to the experiment's answers; `entry` states
+    the box in experiment.toml.
     """
 
     name: str
@@ -55,7 +55,7 @@ class FoundResource(Strict):
     lower_m: list[float]
     upper_m: list[float]
     solved: bool
-    answer: dict[str, Any] | None
+    answer: dict[str, Any]
     entry: str
 
 

@@ -32,7 +32,7 @@ from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
 from app.api.wire.revision import IfMatch, check_revision, etag
 from app.errors import BadInputError
-from app.experiment.folder import Experiment, ExperimentSettings
+from app.experiment.folder import ExperimentSettings
 from app.experiment.rig_settings import RealCameraSettings
 from app.files.toml import parse, to_plain, to_toml, toml_data
 from app.files.toml_errors import Said
@@ -46,7 +46,7 @@ from app.setup.experiment import (
     SAMPLE,
     TEMPLATES,
     add_experiment,
-    answers_text,
+    answers_of,
     change_answers,
     corner_of,
     room_of,
@@ -113,13 +113,14 @@ def list_templates(given: Given) -> list[TemplateResource]:
 @router.post("/answers/check")
 def check_answers(given: Given, sent: SentAnswers) -> CheckResource:
     """Return every mistake at its field; where there is none, what the answers make."""
-    kept = None if sent.experiment is None else _kept(given.folders.open(sent.experiment))
-    wrong = _mistakes(given, sent.answers, kept)
+    found = None if sent.experiment is None else given.folders.open(sent.experiment)
+    wrong = _mistakes(given, sent.answers, None if found is None else answers_of(found).answers)
     if wrong:
         lines = [MistakeResource(field=field_name(one.path), sentence=one.sentence) for one in wrong]
         return CheckResource(mistakes=lines, told=None)
     answers = parse(sent.answers, Answers, ANSWERS_FILE)
-    return CheckResource(mistakes=[], told=_told(settings_of(answers, corner_of(_room(given, sent.answers)))))
+    corner_m = corner_of(_room(given, sent.answers)) if found is None else found.settings.scene.room.lower_m
+    return CheckResource(mistakes=[], told=_told(settings_of(answers, corner_m)))
 
 
 @router.post("/experiments/from-answers", status_code=201)
@@ -133,10 +134,11 @@ def create_from_answers(given: Given, new: NewAnswers, response: Response) -> Ex
 
 @router.get("/experiments/{experiment}/answers")
 def read_answers(given: Given, experiment: Identifier, response: Response) -> AnswersResource:
-    """Return the answers that an experiment was made from."""
+    """Return an experiment's rig and room as answers: as they were entered, else read from its scene."""
     found = given.folders.open(experiment)
     response.headers.update(etag(found.revision))
-    return AnswersResource(answers=_kept(found), revision=found.revision)
+    told = answers_of(found)
+    return AnswersResource(answers=told.answers, unsaid=list(told.unsaid), revision=found.revision)
 
 
 @router.put("/experiments/{experiment}/answers")
@@ -146,16 +148,12 @@ def put_answers(
     """Change an experiment's answers; captures and results stay, and a result keeps the room it was made with."""
     with given.folders.locked(experiment):
         found = given.folders.open(experiment)
-        kept = _kept(found)
+        kept = answers_of(found).answers
         check_revision(if_match, {"revision": found.revision, "answers": kept}, {"answers": new.answers})
         _refuse(_mistakes(given, new.answers, kept))
-        changed = change_answers(found, to_toml(new.answers))
+        changed = change_answers(found, new.answers)
     given.ledger.append_event("experiment", {"experiment": experiment, "changed": True})
     return experiment_resource(changed, response)
-
-
-def _kept(experiment: Experiment) -> dict[str, Any]:
-    return toml_data(answers_text(experiment), ANSWERS_FILE)
 
 
 def _room(given: Services, data: dict[str, Any]) -> Path | None:

@@ -10,10 +10,13 @@ from app.api.models.jobs import Curves, JobChange, JobResource, NewJob, State
 from app.api.services import Given, Services
 from app.api.wire.bodies import body
 from app.api.wire.identifier import Identifier
+from app.api.wire.problems import ApiError
 from app.api.wire.volumes import pack
+from app.experiment.plan import PlacesLine
 from app.jobs import Job, JobSpec, JobState, explained, kinds
 from app.jobs.attempt import PLANE_FILE
 from app.jobs.folder import JobFolder
+from app.jobs.kinds.places import read_places
 
 router = APIRouter(tags=["jobs"])
 NUMBERS = body("application/octet-stream", "Little-endian float32 in C order, along x then z.")
@@ -94,6 +97,19 @@ def read_field(given: Given, job: Identifier) -> Response:
         return Response(status_code=204)
     packed = pack(plane, "f32")
     return Response(packed.content, media_type="application/octet-stream", headers=packed.headers)
+
+
+@router.get("/jobs/{job}/places")
+def read_places_found(given: Given, job: Identifier) -> PlacesLine:
+    """Return what a finished job of kind `places` found: the signal from other places of the camera."""
+    found = given.ledger.get(job)
+    if found.kind != "places" or found.state is not JobState.done:
+        raise ApiError(
+            "not_found",
+            f"Job {job} has found no places.",
+            "Submit a job of kind places and wait until it is done.",
+        )
+    return read_places(JobFolder(given.ledger.folder / found.id).target())
 
 
 def resource(given: Services, job: Job) -> JobResource:

@@ -40,8 +40,7 @@ from app.errors import BadInputError
 from app.experiment.folder import Experiment, read_manifest
 from app.experiment.found import Found, found_in
 from app.files.reading import reading
-from app.setup.experiment import ANSWERS_FILE
-from app.setup.scene import answer_of
+from app.setup.readback import answer_of
 
 router = APIRouter(tags=["results"])
 NUMBERS = body(
@@ -263,14 +262,13 @@ def _field(volume: Volume) -> FieldResource:
 
 
 def _found(one: Found, experiment: Experiment) -> FoundResource:
-    entered = (experiment.folder / ANSWERS_FILE).is_file()
     return FoundResource(
         name=one.box.name,
         sentence=one.sentence,
         lower_m=list(one.box.lower_m),
         upper_m=list(one.box.upper_m),
         solved=one.solved,
-        answer=answer_of(one.box, experiment.settings.scene.room.lower_m) if entered else None,
+        answer=answer_of(one.box, experiment.settings.scene.room.lower_m),
         entry=one.entry,
     )
 

@@ -8,7 +8,8 @@ import pytest
 from app.experiment.folder import open_experiment
 from app.setup.answers import ObjectAnswer
 from app.setup.experiment import new_experiment, read_answers, template
-from app.setup.scene import answer_of, object_of, settings_of
+from app.setup.readback import answer_of
+from app.setup.scene import object_of, settings_of
 from core.objects import READY, RoomObject
 
 PEOPLE = """

@@ -87,6 +87,12 @@ export function table(kind: Scale["kind"]): Uint8ClampedArray {
   return colours;
 }
 
+/** The same colours as a page's styles write them. */
+export function inks(kind: Scale["kind"]): string[] {
+  const colours = table(kind);
+  return Array.from({ length: 256 }, (_, n) => `rgb(${colours.slice(3 * n, 3 * n + 3).join(" ")})`);
+}
+
 /** What is no air: people and furniture. */
 export const SOLID: Stop = [128, 130, 134];
 

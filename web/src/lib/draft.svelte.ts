@@ -41,6 +41,8 @@ class Draft {
   revision = $state("");
   /** Why the experiment's room cannot be edited here; empty where it can. */
   refused = $state("");
+  /** What the experiment's scene holds and no answer says; a change leaves it as it is. */
+  unsaid = $state.raw<string[]>([]);
   past = $state.raw<Tree[]>([]);
   future = $state.raw<Tree[]>([]);
   private last = "";
@@ -62,13 +64,14 @@ class Draft {
   async open(experiment: string | null): Promise<void> {
     [this.past, this.future, this.last] = [[], [], ""];
     [this.answers, this.check, this.experiment, this.refused] = [{}, null, experiment, ""];
+    this.unsaid = [];
     // An answer to a question of before, about another experiment, is not waited for.
     clearTimeout(this.timer);
     this.asked++;
     if (experiment) {
       try {
         const found = await ask("GET /experiments/{experiment}/answers", { experiment });
-        [this.answers, this.revision] = [found.answers, found.revision];
+        [this.answers, this.unsaid, this.revision] = [found.answers, found.unsaid, found.revision];
         if (bench.adding) this.add("object", bench.adding);
       } catch (error) {
         if (!(error instanceof ProblemError) || error.problem.code !== "bad_input") throw error;

@@ -59,62 +59,6 @@ export function streamlines(grid: Grid, each = 4, steps = 300): Lines {
   return linesOf(lines, speeds);
 }
 
-/** Short strokes that move along streamlines as fast as the air does; each begins anew at its line's end. */
-export class Strokes {
-  readonly lines: Lines;
-  private readonly paths: { first: number; times_s: number[]; phase_s: number }[] = [];
-
-  constructor(
-    private readonly along: Lines,
-    private readonly tail_s: number,
-  ) {
-    const { cells, points, speeds } = along;
-    const at = (n: number) => [points[3 * n]!, points[3 * n + 1]!, points[3 * n + 2]!] as const;
-    for (let c = 0; c < cells.length; c += cells[c]! + 1) {
-      const first = cells[c + 1]!;
-      const times_s = [0];
-      for (let n = 1; n < cells[c]!; n++) {
-        const [from, to] = [at(first + n - 1), at(first + n)];
-        const length = Math.hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
-        times_s.push(times_s[n - 1]! + length / Math.max(1e-6, speeds[first + n]!));
-      }
-      // Spread over the line by a fixed irregular amount, so that they do not all begin together.
-      this.paths.push({ first, times_s, phase_s: ((this.paths.length * 0.618) % 1) * times_s.at(-1)! });
-    }
-    const count = this.paths.length;
-    this.lines = {
-      points: new Float32Array(6 * count),
-      cells: Uint32Array.from(this.paths.flatMap((_, n) => [2, 2 * n, 2 * n + 1])),
-      speeds: new Float32Array(2 * count),
-    };
-  }
-
-  /** Puts every stroke where it is at a time. */
-  move(now_s: number): void {
-    this.paths.forEach((path, n) => {
-      const whole_s = path.times_s.at(-1)!;
-      const head_s = whole_s > 0 ? (now_s + path.phase_s) % whole_s : 0;
-      this.put(2 * n, path, Math.max(0, head_s - this.tail_s));
-      this.put(2 * n + 1, path, head_s);
-    });
-  }
-
-  private put(n: number, path: { first: number; times_s: number[] }, time_s: number): void {
-    const { times_s, first } = path;
-    let [low, high] = [0, times_s.length - 1];
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (times_s[middle]! <= time_s) low = middle;
-      else high = middle;
-    }
-    const part = (time_s - times_s[low]!) / Math.max(1e-9, times_s[high]! - times_s[low]!);
-    const [a, b] = [3 * (first + low), 3 * (first + high)];
-    for (let c = 0; c < 3; c++)
-      this.lines.points[3 * n + c] = this.along.points[a + c]! * (1 - part) + this.along.points[b + c]! * part;
-    this.lines.speeds[n] = this.along.speeds[first + low]!;
-  }
-}
-
 function linesOf(lines: Vector[][], speeds: number[]): Lines {
   const cells: number[] = [];
   let first = 0;

@@ -50,6 +50,17 @@ export function facesOf(thing: Thing): Opening[] {
   });
 }
 
+/** The boxes of objects, each from its six faces. */
+export function boxesOf(openings: Opening[]): { lower: Vector; upper: Vector }[] {
+  const tops = openings.flatMap((one, n) => (one.kind === "object" && one.label ? [n] : []));
+  return tops.map((first) => {
+    const corners = openings.slice(first, first + 6).flatMap((face) => face.corners);
+    const reach = (most: (...values: number[]) => number) =>
+      [0, 1, 2].map((axis) => most(...corners.map((corner) => corner[axis]!))) as Vector;
+    return { lower: reach(Math.min), upper: reach(Math.max) };
+  });
+}
+
 /** Where the camera of the first view stands; none where there is no scene. */
 export function cameraOf(settings: unknown): Vector | null {
   const scene = (settings as { scene?: { views?: { camera?: { position_m?: number[] } }[] } } | undefined)?.scene;

@@ -18,8 +18,9 @@ import vtkVolumeMapper from "@kitware/vtk.js/Rendering/Core/VolumeMapper";
 import vtkGenericRenderWindow from "@kitware/vtk.js/Rendering/Misc/GenericRenderWindow";
 import type { Numbers } from "./api";
 import { stops, type Scale } from "./colour";
-import { arrows, speedLimit, streamlines, Strokes, type Grid, type Lines } from "./flow";
-import type { Opening, Vector } from "./room";
+import { arrows, speedLimit, streamlines, type Grid, type Lines } from "./flow";
+import { boxesOf, type Opening, type Vector } from "./room";
+import { Strokes, type Screen } from "./strokes";
 import { ticksOf } from "./ticks";
 
 export type Axis = "x" | "y" | "z";
@@ -70,7 +71,7 @@ const SMOOTH_MS = 90;
 // Room air crosses a room in half a minute: shown so many times as fast, each stroke as long as it goes in this time.
 const FASTER = 4;
 const TAIL_S = 3;
-const FRAME_MS = 40;
+const FRAME_MS = 33;
 // A way along which a plane is dragged is at least so long on the screen.
 const SHORTEST_PX = 12;
 // How far below the middle of the room one looks from the corner, in halves of its height.
@@ -101,14 +102,13 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
   const cubes = vtkImageMarchingCubes.newInstance({ computeNormals: true, mergePoints: true });
   const surface = actorOf(cubes.getOutputPort());
   surface.getProperty().setOpacity(0.7);
-  const [arrowActor, lineActor, strokeActor] = [0, 1, 2].map(() => vtkActor.newInstance()) as Actor[];
+  const [arrowActor, lineActor] = [0, 1].map(() => vtkActor.newInstance()) as Actor[];
   const planes = { x: vtkActor.newInstance(), y: vtkActor.newInstance(), z: vtkActor.newInstance() };
   for (const axis of AXES) planes[axis].getProperty().setLighting(false);
   arrowActor!.getProperty().setLineWidth(2);
   lineActor!.getProperty().setLineWidth(1.5);
   // What moves along them is to be seen first.
   lineActor!.getProperty().setOpacity(0.4);
-  strokeActor!.getProperty().setLineWidth(4);
   const outline = vtkOutlineFilter.newInstance();
   const frame = actorOf(outline.getOutputPort());
   frame.getProperty().setColor(0.6, 0.65, 0.7);
@@ -118,11 +118,18 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     return [x * width, (1 - y) * height];
   };
   const marks = new Marks(place, onScreen);
+  // What moves is drawn here; the room below it stays as it is until somebody turns or changes it.
+  const sheet = document.createElement("canvas");
+  sheet.className = "strokes";
+  place.append(sheet);
+  const pen = sheet.getContext("2d")!;
   const grips = { x: grip("x"), y: grip("y"), z: grip("z") };
   let walls: Actor[] = [];
   let scale: Scale = { low: 0, high: 1, kind: "rising" };
   let shown: { values: Numbers; axes: Grid["axes"] } | null = null;
   let strokes: Strokes | null = null;
+  let boxes: Screen[] = [];
+  let flows = false;
   let stride = 0;
   let voxel_m = 1;
   let timer = 0;
@@ -167,6 +174,7 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
   /** Puts words and grips where they belong. */
   function put(): void {
     marks.put();
+    drawStrokes();
     for (const axis of AXES) {
       const [left, top] = onScreen(cornerOf(axis, cuts[axis]));
       grips[axis].style.transform = `translate(-50%, -50%) translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
@@ -192,11 +200,12 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     outline.setInputData(image);
     const fastest = velocity ? flow({ axes, u: velocity[0]!, v: velocity[1]!, w: velocity[2]! }) : 0;
     for (const axis of AXES) planes[axis].setMapper(planeMapper(values, axes, axis, cuts[axis], scale));
+    boxes = boxesOf(openings);
     walls = [...openings.map(openingOf), ...(camera ? [sightOf(camera, axes)] : [])];
     renderer.removeAllViewProps();
     renderer.addVolume(volume);
     // An actor that has nothing to draw yet cannot be rendered.
-    for (const actor of [...Object.values(planes), surface, arrowActor!, lineActor!, strokeActor!, frame, ...walls])
+    for (const actor of [...Object.values(planes), surface, arrowActor!, lineActor!, frame, ...walls])
       if (actor.getMapper()) renderer.addActor(actor);
     marks.set([
       ...axisMarks(axes),
@@ -212,11 +221,9 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
   function flow(grid: Grid): number {
     const fastest = speedLimit(grid);
     const lines = streamlines(grid);
-    strokes = new Strokes(lines, TAIL_S);
-    strokes.move(0);
+    strokes = new Strokes(lines, TAIL_S, fastest);
     arrowActor!.setMapper(linesMapper(linesData(arrows(grid)), fastest));
     lineActor!.setMapper(linesMapper(linesData(lines), fastest));
-    strokeActor!.setMapper(linesMapper(linesData(strokes.lines), fastest));
     return fastest;
   }
 
@@ -232,7 +239,7 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     surface.setVisibility(modes.surface);
     arrowActor!.setVisibility(modes.arrows && strokes !== null);
     lineActor!.setVisibility(modes.streamlines && strokes !== null);
-    strokeActor!.setVisibility(modes.streamlines && strokes !== null);
+    flows = modes.streamlines && strokes !== null;
     const value = scale.low + level * (scale.high - scale.low);
     if (modes.surface) cubes.setContourValue(value);
     const colour: number[] = [0, 0, 0];
@@ -276,17 +283,51 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
 
   function step(): void {
     const began_ms = performance.now();
-    const data = strokeActor!.getMapper()?.getInputData() as ReturnType<typeof linesData> | undefined;
-    if (strokes && data && strokeActor!.getVisibility() && !document.hidden) {
-      strokes.move((FASTER * began_ms) / 1000);
-      data.getPoints().modified();
-      data.modified();
-      window3d.render();
+    if (flows && !document.hidden) {
+      drawStrokes();
       place.dataset["moved"] = String(Number(place.dataset["moved"] ?? 0) + 1);
     }
     // At least a fifth of the time is left free for everything else.
     const took_ms = performance.now() - began_ms;
     timer = window.setTimeout(step, Math.max(FRAME_MS - took_ms, took_ms / 4));
+  }
+
+  /** The strokes where they are now, over the room as it was drawn last. */
+  function drawStrokes(): void {
+    const { width, height } = place.getBoundingClientRect();
+    const ratio = window.devicePixelRatio;
+    const [columns, rows] = [Math.round(width * ratio), Math.round(height * ratio)];
+    // A new size empties the sheet as well.
+    if (sheet.width !== columns || sheet.height !== rows) [sheet.width, sheet.height] = [columns, rows];
+    else pen.clearRect(0, 0, width, height);
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    if (!strokes || !flows) return;
+    const eye = [...renderer.getActiveCamera().getPosition()] as Vector;
+    strokes.draw(pen, (FASTER * performance.now()) / 1000, { at: eye, onScreen: projection() }, screens());
+  }
+
+  /** Where places of the room are on the screen as it is seen now, by one matrix. */
+  function projection(): (at: Vector) => [number, number] {
+    const { width, height } = place.getBoundingClientRect();
+    const m = renderer.getActiveCamera().getCompositeProjectionMatrix(width / Math.max(1, height), -1, 1);
+    const row = (n: number, [x, y, z]: Vector) => m[n]! * x + m[n + 1]! * y + m[n + 2]! * z + m[n + 3]!;
+    return (at) => {
+      const depth = row(12, at);
+      return [(0.5 + (0.5 * row(0, at)) / depth) * width, (0.5 - (0.5 * row(4, at)) / depth) * height];
+    };
+  }
+
+  /** What hides a stroke: the planes that are shown, and what stands in the room. */
+  function screens(): Screen[] {
+    if (!shown) return [];
+    const { axes } = shown;
+    const flat = AXES.filter((one) => planes[one].getVisibility()).map((one): Screen => {
+      const ends = [0, -1].map((end) => AXES.map((axis) => axes[axis].at(end) ?? 0)) as [Vector, Vector];
+      const at = axes[one][nearestIndex(cuts[one], axes[one].length)] ?? 0;
+      for (const corner of ends) corner[AXES.indexOf(one)] = at;
+      return { lower: ends[0], upper: ends[1] };
+    });
+    return [...flat, ...boxes];
   }
 
   /** Choose the finest stride that this machine draws smoothly: without a graphics card a frame costs as much as its samples. */
@@ -303,23 +344,55 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
 
   /** Wait until everything is really drawn: reading one pixel does. */
   function finish(): void {
-    const gl = place.querySelector("canvas")?.getContext("webgl2");
+    const gl = place.querySelector<HTMLCanvasElement>("canvas:not(.strokes)")?.getContext("webgl2");
     gl?.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
+  /** The room, what moves in it and the words, on one canvas. */
+  function copyTo(paper: CanvasRenderingContext2D, room: CanvasImageSource): void {
+    const { canvas } = paper;
+    paper.drawImage(room, 0, 0, canvas.width, canvas.height);
+    paper.drawImage(sheet, 0, 0, canvas.width, canvas.height);
+    marks.write(paper, canvas.width / Math.max(1, place.clientWidth));
+  }
+
+  /** A copy of the room: it can be read in the turn in which it is drawn, and no later. */
+  function drawnRoom(): HTMLCanvasElement | null {
+    const canvas = place.querySelector<HTMLCanvasElement>("canvas:not(.strokes)");
+    const copy = document.createElement("canvas");
+    if (!canvas) return null;
+    [copy.width, copy.height] = [canvas.width, canvas.height];
+    window3d.render();
+    copy.getContext("2d")?.drawImage(canvas, 0, 0);
+    return copy;
+  }
+
   async function picture(): Promise<string> {
-    const [captured] = window3d.captureImages();
-    return (await captured) ?? "";
+    const room = drawnRoom();
+    if (!room) return "";
+    const paper = room.cloneNode() as HTMLCanvasElement;
+    copyTo(paper.getContext("2d")!, room);
+    return paper.toDataURL("image/png");
   }
 
   function film(seconds: number): Promise<Blob | null> {
-    const canvas = place.querySelector("canvas");
-    if (!canvas || typeof MediaRecorder === "undefined") return Promise.resolve(null);
-    const recorder = new MediaRecorder(canvas.captureStream(25), { mimeType: "video/webm" });
+    let room = drawnRoom();
+    if (!room || typeof MediaRecorder === "undefined") return Promise.resolve(null);
+    const paper = room.cloneNode() as HTMLCanvasElement;
+    const recorder = new MediaRecorder(paper.captureStream(25), { mimeType: "video/webm" });
     const parts: Blob[] = [];
     recorder.ondataavailable = (event) => parts.push(event.data);
+    const turned = renderer.getActiveCamera().onModified(() => (room = null));
+    const copying = window.setInterval(() => {
+      room ??= drawnRoom();
+      if (room) copyTo(paper.getContext("2d")!, room);
+    }, FRAME_MS);
     return new Promise((done) => {
-      recorder.onstop = () => done(new Blob(parts, { type: "video/webm" }));
+      recorder.onstop = () => {
+        clearInterval(copying);
+        turned.unsubscribe();
+        done(new Blob(parts, { type: "video/webm" }));
+      };
       recorder.start();
       setTimeout(() => recorder.stop(), 1000 * seconds);
     });
@@ -368,6 +441,7 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     watch.disconnect();
     turning.unsubscribe();
     marks.set([]);
+    sheet.remove();
     for (const axis of AXES) grips[axis].remove();
     view.delete();
   }
@@ -401,6 +475,17 @@ class Marks {
       this.place.append(element);
       return { mark, element };
     });
+  }
+
+  /** The same words on a picture, `scale` of its pixels to one of the page. */
+  write(paper: CanvasRenderingContext2D, scale: number): void {
+    paper.font = `${Math.round(13 * scale)}px "DejaVu Sans", sans-serif`;
+    paper.fillStyle = "#dfe5ea";
+    [paper.textAlign, paper.textBaseline] = ["center", "middle"];
+    for (const { mark } of this.kept) {
+      const [left, top] = this.seen(mark.at);
+      paper.fillText(mark.text, left * scale, top * scale);
+    }
   }
 
   put(): void {

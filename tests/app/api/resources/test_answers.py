@@ -72,9 +72,26 @@ def test_a_request_names_no_file_of_the_machine(client: Client, truth: str):
         client.create_from_answers(sent)
 
 
-def test_an_experiment_without_answers_says_so(client: Client):
+def test_a_room_that_a_file_described_is_edited_as_answers(client: Client):
     made = client.create_experiment(camera_px=64)
-    with pytest.raises(
-        ServiceError, match=rf"were not entered as answers.*{made.experiment}.experiment\.toml"
-    ):
+    told = client.answers(made.experiment)
+    assert told.unsaid == ["boundary/plane_x_min.npz: temperature and velocity known on the plane x_min."]
+    assert client.check_answers(told.answers, made.experiment).mistakes == []
+    supply = {**told.answers["supply"][0], "temperature": "29 C"}
+
+    later = client.change_answers(made.experiment, {**told.answers, "supply": [supply]}, told.revision)
+
+    kinds = [one["kind"] for one in later.settings["scene"]["boundary"]]
+    assert "plane_field" in kinds
+    assert client.answers(made.experiment).answers["supply"] == [supply]
+
+
+def test_a_room_that_no_camera_of_the_page_sees_says_where_it_is_edited(client: Client, live: Live):
+    made = client.create_experiment(camera_px=64)
+    file = live.app.state.services.folders.folder(made.experiment) / "experiment.toml"
+    text = file.read_text()
+    assert 'wall = "y_max"' in text
+    side = text.replace('wall = "y_max"', 'wall = "x_max"', 1)
+    file.write_text(side.replace("position_m = [0", "position_m = [-50", 1))
+    with pytest.raises(ServiceError, match=r"No camera looks at the wall y_max.*experiment\.toml"):
         client.answers(made.experiment)

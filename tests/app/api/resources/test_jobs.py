@@ -68,3 +68,14 @@ def test_an_unknown_job_and_an_impossible_request_are_told_apart(airlens: Client
     with pytest.raises(ServiceError) as caught:
         airlens.act_on_job(done, "resume")
     assert caught.value.problem.code == "conflict"
+
+
+def test_places_are_read_from_a_job_that_found_them(airlens: Client):
+    (answers,) = (one.answers for one in airlens.templates() if one.template == "empty")
+    study = airlens.submit_job("noise-study", STUDY).job
+    job = airlens.submit_job("places", {"answers": answers}, title="Places of the camera").job
+    assert airlens.wait(job, limit_s=500, every_s=0.5).state == "done"
+    found = airlens.places(job)
+    assert len(found.x_m) * len(found.y_m) == 49
+    with pytest.raises(ServiceError, match="has found no places"):
+        airlens.places(study)

@@ -77,16 +77,15 @@ THING = Found(
 )
 
 
-def test_what_was_found_is_offered_where_the_room_was_entered_as_answers(
-    airlens: Client, live: Live, made: tuple[str, str]
-):
+def test_what_was_found_is_offered_as_an_answer(airlens: Client, live: Live, made: tuple[str, str]):
     folder = live.app.state.services.folders.folder(made[0])
     result = folder / "results" / made[1]
     before = read_manifest(result)
     assert airlens.result(*made).found == []
     write_manifest(result, before | {"found": to_plain((THING,))})
     (one,) = airlens.result(*made).found
-    assert (one.name, one.sentence, one.solved, one.answer) == ("found 1", "Something stands.", True, None)
+    assert (one.name, one.sentence, one.solved) == ("found 1", "Something stands.", True)
+    assert one.answer["kind"] == "box"
     assert "lower_m = [0.5, -0.5, 0.0]" in one.entry
 
     answers = next(each.answers for each in airlens.templates() if each.template == "sample")
@@ -94,7 +93,6 @@ def test_what_was_found_is_offered_where_the_room_was_entered_as_answers(
     there = live.app.state.services.folders.folder(entered) / "results" / "r1"
     shutil.copytree(result, there)
     (offered,) = airlens.result(entered, "r1").found
-    assert offered.answer is not None
     changed = answers | {"object": [offered.answer]}
     assert airlens.check_answers(changed, entered).mistakes == []
     airlens.change_answers(entered, changed)

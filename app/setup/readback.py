@@ -1,0 +1,294 @@
+"""A scene as answers, whoever wrote it, so that the page can edit it; and in words what no answer can say.
+
+What is told in `unsaid` stays in the scene as it is when answers change (`app/setup/change.py`).
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from app.errors import BadInputError
+from app.experiment.boundary import read_sensor_table
+from app.experiment.folder import Experiment, ExperimentSettings
+from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
+from app.setup.answers import MANY
+from core.geometry import Optics, Vector3, face_of
+from core.objects import RoomObject
+from core.problem import SensorData
+from core.scene import (
+    CheckerPattern,
+    Heater,
+    Inlet,
+    Outlet,
+    Patch,
+    PlaneField,
+    PointSensors,
+    ProjectedPattern,
+    Scene,
+    View,
+    Wall,
+)
+
+_KELVIN = 273.15
+_LEAST_STD = 1e-3
+
+
+@dataclass(frozen=True)
+class ReadBack:
+    """Answers with units as a person writes them, and a sentence on each thing that they cannot say."""
+
+    answers: dict[str, Any]
+    unsaid: tuple[str, ...]
+
+
+@dataclass
+class _Told:
+    """What is being read: the room's corner, and what has been found that no answer says."""
+
+    corner_m: Vector3
+    unsaid: list[str] = field(default_factory=list)
+
+    def place(self, at_m: Vector3) -> list[str]:
+        return [metres(value - corner) for value, corner in zip(at_m, self.corner_m, strict=True)]
+
+
+def read_back(experiment: Experiment) -> ReadBack:
+    """The experiment's scene and rig as answers. Raises BadInputError where no camera looks at y_max."""
+    found = scene_back(experiment.settings)
+    sensors, unsaid = _sensors(experiment)
+    return ReadBack(found.answers | sensors, found.unsaid + unsaid)
+
+
+def scene_back(settings: ExperimentSettings) -> ReadBack:
+    """The same of settings alone, without what files of sensors hold."""
+    told = _Told(settings.scene.room.lower_m)
+    view = asked_view(settings.scene)
+    answers: dict[str, Any] = {
+        "title": settings.title,
+        "room": [metres(value) for value in settings.scene.room.size_m],
+        "air": celsius(settings.scene.air.ambient_temperature_k),
+        "camera": _camera(settings, view, told),
+    }
+    if not isinstance(settings.scene.light.pattern, CheckerPattern):
+        answers["pattern_seed"] = settings.scene.light.pattern.seed
+    if isinstance(settings.scene.light, ProjectedPattern):
+        answers["projector"] = _projector(settings.rig, settings.scene.light.projector, told)
+    answers |= _boundary(settings.scene, told)
+    answers["object"] = [_object(item, told) for item in settings.scene.objects]
+    _other_views(settings.scene, view, told)
+    return ReadBack({name: value for name, value in answers.items() if value != []}, tuple(told.unsaid))
+
+
+def asked_view(scene: Scene) -> View:
+    """The view that the answers' camera is: the first that looks at y_max. Raises BadInputError."""
+    found = next((view for view in scene.views if view.wall == "y_max"), None)
+    if found is None:
+        raise BadInputError(
+            "No camera looks at the wall y_max, which the page draws the room from: change rig and room in "
+            "experiment.toml."
+        )
+    return found
+
+
+def listed_tables(experiment: Experiment) -> frozenset[str]:
+    """The tables of sensors that answers can hold: short, and no anemometer with a component left out."""
+    return frozenset(file for file, table in _tables(experiment).items() if _is_short(table))
+
+
+def answer_of(box: RoomObject, corner_m: Vector3) -> dict[str, Any]:
+    """An object as an answer, its place measured from the room's corner."""
+    return _object(box, _Told(corner_m))
+
+
+def blows_in(inlet: Inlet) -> float:
+    """The part of an inlet's velocity straight off its wall [m/s]."""
+    face = face_of(inlet.patch.wall)
+    return face.inward * inlet.velocity_m_s[face.axis]
+
+
+def metres(value_m: float) -> str:
+    """A length as it is written; to the micrometre, which is less than a tape measure's own digits."""
+    return f"{_plain(value_m, 6)} m"
+
+
+def celsius(value_k: float) -> str:
+    """A temperature as it is written; in kelvin where C would look like kelvin."""
+    value = value_k - _KELVIN
+    return f"{_plain(value_k, 6)} K" if 250 <= value <= 330 else f"{_plain(value, 6)} C"
+
+
+def _plain(value: float, digits: int) -> str:
+    return f"{round(value, digits) + 0.0:.12g}"
+
+
+def _kelvin(value_k: float) -> str:
+    return f"{max(value_k, _LEAST_STD):.9g} K"
+
+
+def _camera(settings: ExperimentSettings, view: View, told: _Told) -> dict[str, Any]:
+    optics, device = view.camera, settings.rig.camera
+    if any(optics.rotation_rad) and not _is_straight(optics):
+        told.unsaid.append("The camera is turned: its direction stays as it is when its place changes.")
+    answer: dict[str, Any] = {
+        "kind": "v4l2" if device is None else device.kind,
+        "width_px": optics.width_px,
+        "height_px": optics.height_px,
+        "bits": view.noise.bits,
+        "frames": view.frames,
+        "angle_of_view": f"{_angle_deg(optics):.9g} deg",
+        "position": told.place(optics.position_m),
+    }
+    if device is None:
+        told.unsaid.append("No camera is named: pictures are imported.")
+    elif isinstance(device, SimulatedCameraSettings):
+        answer["truth"] = device.room
+        answer["exposure"] = f"{1000 * device.exposure_s:.9g} ms"
+    else:
+        answer |= {"device": device.device, "pixel_format": device.pixel_format}
+        if device.exposure_s is not None:
+            answer["exposure"] = f"{1000 * device.exposure_s:.9g} ms"
+    return answer
+
+
+def _is_straight(optics: Optics) -> bool:
+    """Whether it looks along y, upright."""
+    return bool(np.allclose(optics.rotation @ np.array([0.0, 1.0, 0.0]), [0.0, 0.0, 1.0], atol=1e-6))
+
+
+def _angle_deg(optics: Optics) -> float:
+    return math.degrees(2 * math.atan(optics.width_px / (2 * optics.focal_px[0])))
+
+
+def _projector(rig: RigSettings, optics: Optics, told: _Told) -> dict[str, Any]:
+    return {
+        "position": told.place(optics.position_m),
+        "width_px": optics.width_px,
+        "height_px": optics.height_px,
+        "angle_of_view": f"{_angle_deg(optics):.9g} deg",
+        "url": rig.projector.url if rig.projector else "",
+    }
+
+
+def _boundary(scene: Scene, told: _Told) -> dict[str, list[dict[str, Any]]]:
+    found: dict[str, list[dict[str, Any]]] = {"supply": [], "outlet": [], "surface": [], "wall": []}
+    for part in scene.boundary:
+        match part:
+            case Inlet() if blows_in(part) > 0:
+                found["supply"].append(_supply(part, len(found["supply"]) + 1, told))
+            case Inlet():
+                told.unsaid.append(f"A supply on {part.patch.wall} does not blow into the room.")
+            case Outlet():
+                found["outlet"].append(_opening(part.patch, told) | _reading(part, part.mean_temperature_k))
+            case Heater():
+                found["surface"].append(_opening(part.patch, told) | _reading(part, part.temperature_k))
+            case Wall():
+                found["wall"] += _wall(part, told)
+            case PlaneField():
+                told.unsaid.append(f"{part.file}: temperature and velocity known on the plane {part.wall}.")
+            case PointSensors():
+                pass
+    return found
+
+
+def _supply(inlet: Inlet, number: int, told: _Told) -> dict[str, Any]:
+    speed_m_s = blows_in(inlet)
+    if abs(speed_m_s - math.hypot(*inlet.velocity_m_s)) > 1e-6 * speed_m_s:
+        told.unsaid.append(
+            f"Supply {number} blows at an angle to its wall. Its speed here is the part straight off the wall; the "
+            "part along the wall stays as it is."
+        )
+    share = min(1.0, max(1e-4, inlet.velocity_std_m_s / speed_m_s))
+    return {
+        **_opening(inlet.patch, told),
+        "speed": f"{speed_m_s:.9g} m/s",
+        "deviation": f"{100 * share:.9g} %",
+        **_reading(inlet, inlet.temperature_k),
+    }
+
+
+def _opening(patch: Patch, told: _Told) -> dict[str, Any]:
+    corner = [told.corner_m[axis] for axis in face_of(patch.wall).along]
+    return {
+        "wall": patch.wall,
+        "lower": [metres(value - start) for value, start in zip(patch.lower_m, corner, strict=True)],
+        "upper": [metres(value - start) for value, start in zip(patch.upper_m, corner, strict=True)],
+    }
+
+
+def _reading(part: Inlet | Outlet | Heater | Wall | RoomObject, value_k: float | None) -> dict[str, Any]:
+    if value_k is None:
+        return {}
+    return {"temperature": celsius(value_k), "temperature_deviation": _kelvin(part.temperature_std_k)}
+
+
+def _wall(wall: Wall, told: _Told) -> list[dict[str, Any]]:
+    if not wall.no_slip:
+        told.unsaid.append(f"Air does not stick to the wall {wall.wall}.")
+    if wall.thermal == "unknown":
+        return []
+    known = {"adiabatic": True} if wall.thermal == "adiabatic" else _reading(wall, wall.temperature_k)
+    return [{"wall": wall.wall} | known]
+
+
+def _object(item: RoomObject, told: _Told) -> dict[str, Any]:
+    middle_m = tuple(0.5 * (low + high) for low, high in zip(item.lower_m, item.upper_m, strict=True))
+    answer: dict[str, Any] = {
+        "kind": "box",
+        "position": told.place((middle_m[0], middle_m[1], item.lower_m[2])),
+        "size": [metres(value) for value in item.size_m],
+    }
+    if item.thermal == "power" and item.power_w is not None:
+        answer |= {"heat": f"{item.power_w:.9g} W", "heat_deviation": f"{max(item.power_std_w, 0.1):.9g} W"}
+    return answer | _reading(item, item.temperature_k)
+
+
+def _tables(experiment: Experiment) -> dict[str, SensorData]:
+    scene = experiment.settings.scene
+    files = (part.file for part in scene.boundary if isinstance(part, PointSensors))
+    return {file: read_sensor_table(experiment.file(file), scene) for file in files}
+
+
+def _is_short(table: SensorData) -> bool:
+    known = np.isfinite(table.velocity_m_s)
+    return len(table.position_m) <= MANY and bool(np.all(known.all(axis=1) == known.any(axis=1)))
+
+
+def _sensors(experiment: Experiment) -> tuple[dict[str, Any], tuple[str, ...]]:
+    told = _Told(experiment.settings.scene.room.lower_m)
+    found: dict[str, list[dict[str, Any]]] = {"thermometer": [], "anemometer": []}
+    for file, table in _tables(experiment).items():
+        if not _is_short(table):
+            told.unsaid.append(
+                f"{file}: {len(table.position_m)} readings; up to {MANY}, with all parts of a velocity or none, "
+                "can be listed here."
+            )
+            continue
+        for at_m, value_k, std_k, velocity, std_m_s in zip(
+            table.position_m,
+            table.temperature_k,
+            table.temperature_std_k,
+            table.velocity_m_s,
+            table.velocity_std_m_s,
+            strict=True,
+        ):
+            place = {"position": told.place((float(at_m[0]), float(at_m[1]), float(at_m[2])))}
+            if np.isfinite(value_k):
+                reading = {
+                    "temperature": celsius(float(value_k)),
+                    "temperature_deviation": _kelvin(float(std_k)),
+                }
+                found["thermometer"].append(place | reading)
+            if np.isfinite(velocity).all():
+                parts = [f"{float(part):.9g} m/s" for part in velocity]
+                found["anemometer"].append(
+                    place | {"velocity": parts, "deviation": f"{float(std_m_s):.9g} m/s"}
+                )
+    return {name: items for name, items in found.items() if items}, tuple(told.unsaid)
+
+
+def _other_views(scene: Scene, view: View, told: _Told) -> None:
+    others = [one.name for one in scene.views if one is not view]
+    if others:
+        told.unsaid.append(f"Further cameras: {', '.join(others)}.")
