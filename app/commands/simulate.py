@@ -41,9 +41,9 @@ def simulate(
     world: Annotated[
         Literal["ideal", "lab"],
         typer.Option(
-            help="lab: blur, a lamp that ripples, things before the wall, misread entries, and so on."
+            help="lab: blur, a lamp that ripples, things before the wall, misread entries, and so on; ideal: none."
         ),
-    ] = "ideal",
+    ] = "lab",
     nuisance: Annotated[
         list[str] | None,
         typer.Option(
@@ -51,20 +51,22 @@ def simulate(
         ),
     ] = None,
     drift_px: Annotated[
-        float | None, typer.Option(min=0.0, help="Drift between exposures [px]: 0.1, in a lab 0.3.")
+        float | None, typer.Option(min=0.0, help="Drift between exposures [px]: in a lab 0.3, ideal 0.1.")
     ] = None,
     border: Annotated[
         Literal["print", "bare"] | None,
-        typer.Option(help="Beyond the wall: a still print (ideal), or nothing to see (lab)."),
+        typer.Option(help="Beyond the wall: nothing to see (lab), or a still print (ideal)."),
     ] = None,
     misread: Annotated[
         bool | None,
         typer.Option("--misread/--exact", help="Whether entries are as wrong as stated; in a lab they are."),
     ] = None,
     rig: Annotated[
-        Literal["paper", "lab"],
-        typer.Option(help="Where the optics stand: the paper's 30.5 m, or a lab's 4 m, projector diagonal."),
-    ] = "paper",
+        Literal["paper", "lab"] | None,
+        typer.Option(
+            help="Where the optics stand: a lab's 4 m, projector diagonal (in a lab); the paper's 30.5 m (ideal)."
+        ),
+    ] = None,
     stand_off: Annotated[
         float | None, typer.Option(help="Camera to back wall [m]; the rig's by default.")
     ] = None,
@@ -82,7 +84,7 @@ def simulate(
     from app.simulate.worlds import WORLDS, changed
     from app.volume.scene import RIG_PLACES, RigOptions
 
-    rig_stand_off_m, rig_baseline_m = RIG_PLACES[rig]
+    rig_stand_off_m, rig_baseline_m = RIG_PLACES[rig or WORLDS[world].place]
     options = RigOptions(
         camera_px=parse_size(camera_px),
         light=light,

@@ -17,8 +17,8 @@ from core.result import Solution
 from core.watch import Growing, Watch
 
 _MARK = ".airlens-demo"
-# A lab's pictures with a printed frame where no air moves, as README tells everybody to hang one.
-WORLD = replace(LAB, border="print")
+# A lab's pictures from the paper's place, with a printed frame where no air moves, as README tells everybody to hang.
+WORLD = replace(LAB, border="print", place="paper")
 
 
 @dataclass(frozen=True)

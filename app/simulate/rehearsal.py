@@ -15,11 +15,13 @@ from app.experiment.folder import (
     new_folder,
     open_experiment,
 )
-from app.experiment.rig_settings import BoardSettings, ProjectorSettings, RigSettings, SimulatedCameraSettings
+from app.experiment.rig_settings import BoardSettings, ProjectorSettings, RigSettings
 from app.files.durable import write_durably
+from app.simulate.worlds import WORLDS, WorldName
 from app.volume.file import read_volume
+from app.volume.misread import misread
 from app.volume.sample import SAMPLE_ROOM
-from app.volume.scene import Information, RigOptions, room_scene, write_plane
+from app.volume.scene import RIG_PLACES, Information, RigOptions, room_scene, write_plane
 from calibration.bundle import given_bundle
 from core.scene import PlaneField, ProjectedPattern
 
@@ -38,18 +40,27 @@ class Rehearsal:
     camera_px: int = 384
     light: Literal["texture", "projector"] = "texture"
     information: Information = "surveyed"
+    world: WorldName = "lab"
 
 
 def rehearse(root: Path, wanted: Rehearsal) -> Experiment:
     """Make the experiment below `root` and return it; it appears at once, when it is complete."""
     volume = read_volume(SAMPLE_ROOM)
-    options = RigOptions(camera_px=(wanted.camera_px, wanted.camera_px * 3 // 4), light=wanted.light)
+    world, seed = WORLDS[wanted.world], 0
+    stand_off_m, baseline_m = RIG_PLACES[world.place]
+    options = RigOptions(
+        camera_px=(wanted.camera_px, wanted.camera_px * 3 // 4),
+        light=wanted.light,
+        stand_off_m=stand_off_m,
+        baseline_m=baseline_m,
+    )
     scene = room_scene(volume, options, wanted.information)
+    scene = misread(scene, seed) if world.misreads else scene
     settings = ExperimentSettings(
         title=wanted.title,
         information=wanted.information,
         rig=RigSettings(
-            camera=SimulatedCameraSettings(drift_px=0.1),
+            camera=world.camera(seed),
             projector=TWIN if wanted.light == "projector" else None,
             board=_BOARD,
         ),

@@ -1,5 +1,6 @@
 """Worlds that a simulated rig may stand in: one that spoils nothing, and one like a lab's."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -7,18 +8,24 @@ from pydantic import ValidationError
 
 from app.errors import BadInputError
 from app.experiment.rig_settings import SimulatedCameraSettings, World
+from app.volume.scene import RigName
 
 Border = Literal["print", "bare"]
+WorldName = Literal["ideal", "lab"]
 
 
 @dataclass(frozen=True)
 class RigWorld:
-    """What spoils the pictures, the mount's step between bursts, the border, and whether entries are misread."""
+    """What spoils the pictures, the mount's step between bursts, the border, whether entries are misread.
+
+    `place` is where its rig stands unless somebody says otherwise.
+    """
 
     world: World = field(default_factory=World)
     drift_px: float = 0.0
     border: Border = "print"
     misreads: bool = False
+    place: RigName = "paper"
 
     def camera(self, seed: int, noise_free: bool = False) -> SimulatedCameraSettings:
         """A camera in this world."""
@@ -44,8 +51,9 @@ LAB = RigWorld(
     drift_px=0.3,
     border="bare",
     misreads=True,
+    place="lab",
 )
-WORLDS = {"ideal": IDEAL, "lab": LAB}
+WORLDS: Mapping[WorldName, RigWorld] = {"ideal": IDEAL, "lab": LAB}
 
 
 def changed(

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from core.objects import RoomObject
 from core.scene import BoundaryInformation, Heater, Inlet, Outlet, Scene, Wall
 
 # Apart from the seeds of noise.
@@ -11,7 +12,7 @@ _SEED = 1000
 
 
 def misread(scene: Scene, seed: int) -> Scene:
-    """The scene with every stated temperature and supply off by a draw of its stated deviation."""
+    """The scene with every stated temperature, supply and heat of an object off by a draw of its deviation."""
     draw = np.random.default_rng(_SEED + seed).standard_normal
 
     def read(item: BoundaryInformation) -> BoundaryInformation:
@@ -28,4 +29,12 @@ def misread(scene: Scene, seed: int) -> Scene:
             return replace(item, temperature_k=item.temperature_k + item.temperature_std_k * float(draw()))
         return item
 
-    return replace(scene, boundary=tuple(read(item) for item in scene.boundary))
+    def judged(item: RoomObject) -> RoomObject:
+        if item.power_w is not None:
+            return replace(item, power_w=item.power_w + item.power_std_w * float(draw()))
+        if item.temperature_k is not None:
+            return replace(item, temperature_k=item.temperature_k + item.temperature_std_k * float(draw()))
+        return item
+
+    boundary = tuple(read(item) for item in scene.boundary)
+    return replace(scene, boundary=boundary, objects=tuple(judged(item) for item in scene.objects))

@@ -113,7 +113,9 @@ def fill(http: httpx.Client, root: Path) -> tuple[str, str, Path]:
     """Make two experiments with a capture, a result, a plan, an upload; return the first's and second's name."""
     names = []
     for _ in range(2):
-        made = http.post("/api/experiments", json={"kind": "simulated", "camera_px": 64}).json()["experiment"]
+        made = http.post(
+            "/api/experiments", json={"kind": "simulated", "camera_px": 64, "world": "ideal"}
+        ).json()["experiment"]
         folder = root / "experiments" / made
         names.append(made)
         bodge_capture(folder)

@@ -29,7 +29,7 @@ from app.jobs.folder import JobFolder, read_json
 def experiment(folder: Path) -> Path:
     """A simulated experiment on a grid that takes some seconds to solve."""
     with (files("app.simulate.sample") / "room.npz").open() as truth:
-        options = ["--truth", truth.name, "--camera-px", "256", "--frames", "4"]
+        options = ["--truth", truth.name, "--world", "ideal", "--camera-px", "256", "--frames", "4"]
     CliRunner().invoke(create_cli(), ["simulate", str(folder), *options], catch_exceptions=False)
     settings = folder / "experiment.toml"
     settings.write_text(settings.read_text().replace('grid = "auto"', "grid = 24"))

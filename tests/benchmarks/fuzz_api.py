@@ -214,7 +214,7 @@ def main() -> None:
                 counts += fuzz(description, url, headers, options.cases)
             made = httpx.post(
                 f"{url}/api/experiments",
-                json={"kind": "simulated", "camera_px": 64},
+                json={"kind": "simulated", "camera_px": 64, "world": "ideal"},
                 headers=headers,
                 timeout=60,
             )

@@ -144,7 +144,7 @@ def curves(page: Page, station: Station) -> None:
 
 
 def result(station: Station) -> None:
-    made = rehearse(station.app.state.services.folders.root, Rehearsal(camera_px=128))
+    made = rehearse(station.app.state.services.folders.root, Rehearsal(camera_px=128, world="ideal"))
     axes = [np.linspace(0.0, 3.0, 64)] * 3
     x, y, z = np.meshgrid(*axes, indexing="ij")
     warm = (293 + 5 * np.exp(-((x - 1.5) ** 2 + (y - 1.5) ** 2) - (z - 1) ** 2)).astype(np.float32)

@@ -2,9 +2,10 @@
 
     python -m tests.benchmarks.terminate EXPERIMENT --preset standard --times 10
 
-A real worker on an experiment (made by `airlens simulate`). It runs undisturbed; then it is killed at random shares
-of its solver's work, and begun anew after each. One JSON line a signal, with what the solver said last, and one at
-the end. `--cells` makes a room's grids smaller where 48^3 would take too long, and sets the cells of `grid`.
+A real worker on an experiment (made by `airlens simulate --world ideal`). It runs undisturbed; then it is killed at
+random shares of its solver's work, and begun anew after each. One JSON line a signal, with what the solver said last,
+and one at the end. `--cells` makes a room's grids smaller where 48^3 would take too long, and sets the cells of
+`grid`.
 """
 
 import argparse

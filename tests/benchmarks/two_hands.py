@@ -137,7 +137,7 @@ def rounds(url: str, token: str, root: Path, number: int, hands: int) -> Counter
     """Let `hands` writers do `number` rounds; return counts of answers, broken files and lost changes."""
     told = Told()
     with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {token}"}, timeout=100) as http:
-        made = http.post("/api/experiments", json={"kind": "simulated", "camera_px": 64})
+        made = http.post("/api/experiments", json={"kind": "simulated", "camera_px": 64, "world": "ideal"})
         made.raise_for_status()
     experiment = made.json()["experiment"]
     folder = root / "experiments" / experiment

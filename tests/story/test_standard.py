@@ -19,7 +19,18 @@ def airlens(*words: object) -> str:
 @pytest.mark.timeout(1500)
 def test_a_small_surveyed_room_is_found_by_the_command_line_with_velocity_and_pressure(tmp_path: Path):
     folder = tmp_path / "room"
-    options = ("--truth", ROOM, "--information", "surveyed", "--camera-px", 160, "--frames", 2)
+    options = (
+        "--truth",
+        ROOM,
+        "--information",
+        "surveyed",
+        "--camera-px",
+        160,
+        "--frames",
+        2,
+        "--world",
+        "ideal",
+    )
     airlens("simulate", folder, *options)
     state_grid(folder, 8)
     airlens("reconstruct", folder, "--preset", "standard")

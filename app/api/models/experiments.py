@@ -65,6 +65,7 @@ class NewExperiment(Strict):
     camera_px: int = Field(default=384, ge=64, le=4096)
     light: Literal["texture", "projector"] = "texture"
     boundary: Literal["paper", "operator", "surveyed"] = "surveyed"
+    world: Literal["ideal", "lab"] = "lab"
 
 
 class ExperimentChange(Strict):

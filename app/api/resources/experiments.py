@@ -42,7 +42,9 @@ def list_experiments(given: Given) -> list[ExperimentLine]:
 @router.post("/experiments", status_code=201)
 def create_experiment(given: Given, new: NewExperiment, response: Response) -> ExperimentResource:
     """Make an experiment with a simulated rig, ready to be connected."""
-    made = rehearse(given.folders.root, Rehearsal(new.title, new.camera_px, new.light, new.boundary))
+    made = rehearse(
+        given.folders.root, Rehearsal(new.title, new.camera_px, new.light, new.boundary, new.world)
+    )
     given.ledger.append_event("experiment", {"experiment": made.folder.name, "created": True})
     return experiment_resource(made, response)
 

@@ -22,7 +22,18 @@ from tests.rooms import ROOM, state_grid
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("views") / "room"
-    options = ["--information", "surveyed", "--camera-px", "160", "--frames", "2", "--views", "y,x"]
+    options = [
+        "--information",
+        "surveyed",
+        "--camera-px",
+        "160",
+        "--frames",
+        "2",
+        "--views",
+        "y,x",
+        "--world",
+        "ideal",
+    ]
     done = CliRunner().invoke(
         create_cli(), ["simulate", str(folder), "--truth", str(ROOM), *options], catch_exceptions=False
     )

@@ -74,7 +74,7 @@ def _truth(told) -> str:
 
 
 def test_a_scene_of_a_simulated_rig_is_edited_and_keeps_its_plane(tmp_path):
-    made = rehearse(tmp_path, Rehearsal(camera_px=64))
+    made = rehearse(tmp_path, Rehearsal(camera_px=64, world="ideal"))
     told = answers_of(made)
     assert mistakes_in(told.answers) == []
     assert told.unsaid == ("boundary/plane_x_min.npz: temperature and velocity known on the plane x_min.",)

@@ -20,7 +20,7 @@ def test_a_folder_that_is_no_demo_is_left_alone(tmp_path):
 
 
 def test_its_pictures_are_a_labs_with_a_printed_frame():
-    assert WORLD == replace(LAB, border="print")
+    assert WORLD == replace(LAB, border="print", place="paper")
     assert WORLD.misreads
 
 
