@@ -51,4 +51,4 @@ bench: setup
 
 lock: .venv/.installed
 	$(UV) compile --quiet --universal --generate-hashes --no-header --no-annotate --python-version 3.11 \
-	  --group dev pyproject.toml --output-file requirements.lock
+	  --group dev --extra raw pyproject.toml --output-file requirements.lock

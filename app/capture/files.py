@@ -1,13 +1,12 @@
 """Pictures that another camera took, as a camera: the same burst, verdicts and folder come of them.
 
-TIFF (also of many pages), PNG, JPEG, BMP and PGM of 8 or 16 bits; a camera's raw files where `rawpy` is installed.
+TIFF (also of many pages), PNG, JPEG, BMP and PGM of 8 or 16 bits; a camera's raw files with the extra `raw` (rawpy).
 Colour becomes grey: a pattern has no colour.
 """
 
 import glob
 from collections.abc import Generator, Iterator
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -181,20 +180,34 @@ def _counts(file: Path, pixels: np.ndarray) -> Pixels:
 
 
 def _read_raw(file: Path) -> Pixels:
-    """The green of a camera's raw file, linear, 16 bits: half of the pixels are green."""
-    with _rawpy().imread(str(file)) as raw:
-        colour = raw.postprocess(gamma=(1, 1), no_auto_bright=True, output_bps=16, user_wb=[1.0] * 4)
-    return np.ascontiguousarray(colour[..., 1])
+    """The green of a camera's raw file, black at 0 and white at 65535, as its sensor has it: linear, not turned.
+
+    Where a pixel has no green its neighbours' mean stands: nothing there depends on the noise but linearly.
+    """
+    rawpy = _rawpy()
+    with rawpy.imread(str(file)) as raw:
+        colour = raw.postprocess(
+            demosaic_algorithm=rawpy.DemosaicAlgorithm.LINEAR,
+            output_color=rawpy.ColorSpace.raw,
+            gamma=(1, 1),
+            no_auto_bright=True,
+            adjust_maximum_thr=0.0,  # else a picture's own maximum would set its scale
+            output_bps=16,
+            user_wb=[1.0] * 4,
+            user_flip=0,
+        )
+    return np.ascontiguousarray(colour[..., min(1, colour.shape[2] - 1)])
 
 
 def _rawpy() -> ModuleType:
     try:
-        return import_module("rawpy")
+        import rawpy
     except ImportError:
         raise BadInputError(
-            "A camera's raw files need rawpy, which is not installed. Run: pip install rawpy. Or export the pictures "
-            "as TIFF of 16 bits, linear, without noise reduction."
+            "A camera's raw files need rawpy, which is not installed. Run: pip install 'airlens[raw]', or "
+            "rawpy alone. Or export the pictures as TIFF of 16 bits, linear, without noise reduction."
         ) from None
+    return rawpy
 
 
 def _pages_in(file: Path) -> int:

@@ -28,7 +28,7 @@ def bring(
         float | None, typer.Option(min=150, max=400, help="Temperature of the room [K] (the scene's).")
     ] = None,
 ) -> None:
-    """Make captures of pictures that another camera took: TIFF, PNG, JPEG, or a camera's raw files."""
+    """Make captures of pictures that another camera took: TIFF, PNG, JPEG, or raw files (by airlens[raw])."""
     from rich.progress import Progress as Bar
 
     from app.capture.burst import BurstWatch

@@ -1,5 +1,7 @@
 """Pictures of another camera: mean, scatter and count as of a capture; what cannot be is said before anything."""
 
+import sys
+
 import cv2
 import numpy as np
 import pytest
@@ -69,6 +71,46 @@ def test_mean_scatter_and_count_are_those_of_the_frames(experiment, tmp_path, ki
     assert len(capture.manifest["origin"]["files"]) == (1 if kind == "pages" else FRAMES)
 
 
+def dng(path, mosaic):
+    """A raw file of a colour camera of 12 bits whose black is at 64 counts, red in the corner."""
+    colours_of_xyz = (1, 1, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 0, 1, 0, 1, 1, 1)
+    tags = [
+        (33421, "H", 2, (2, 2), True),  # the mosaic's period, and its colours
+        (33422, "B", 4, b"\x00\x01\x01\x02", True),
+        (50706, "B", 4, b"\x01\x04\x00\x00", True),  # the format's version
+        (50708, "s", 0, "a camera", True),
+        (50714, "H", 1, 64, True),  # black
+        (50717, "H", 1, 4095, True),  # white
+        (50721, "2i", 9, colours_of_xyz, True),
+    ]
+    tifffile.imwrite(path, mosaic, photometric="cfa", extratags=tags)
+
+
+def test_of_a_raw_file_the_green_is_taken_linear_from_black_to_white(experiment, tmp_path):
+    taken = frames()
+    for number, green in enumerate(taken):
+        mosaic = green.copy()
+        mosaic[::2, ::2] //= 3  # less red
+        mosaic[1::2, 1::2] //= 2  # less blue
+        dng(tmp_path / f"{number:02}.dng", np.maximum(mosaic, 64))
+    (one,) = import_pictures(experiment, {"reference": [str(tmp_path / "*.dng")]})
+    assert one.folder is not None
+    capture = load_capture(one.folder)
+    light = (np.maximum(taken, 64) - 64.0) / (4095 - 64)
+    for rows, columns in ((slice(0, None, 2), slice(1, None, 2)), (slice(1, None, 2), slice(0, None, 2))):
+        green = light[:, rows, columns]
+        # One of 65,535 counts, rounded.
+        np.testing.assert_allclose(capture.images[0].mean[rows, columns], green.mean(0), atol=2e-5)
+        np.testing.assert_allclose(capture.images[0].std[rows, columns], green.std(0, ddof=1), atol=2e-5)
+
+
+def test_without_rawpy_a_raw_file_says_what_to_install(experiment, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rawpy", None)
+    dng(tmp_path / "one.dng", frames()[0])
+    with pytest.raises(BadInputError, match=r"airlens\[raw\]"):
+        import_pictures(experiment, {"reference": [str(tmp_path / "one.dng")]})
+
+
 def test_the_noise_comes_from_the_frames():
     # Twice the counts an electron, and a light that flickers by 1 %.
     noise = CameraNoise(full_well_e=5_000.0, read_noise_e=10.0)
@@ -124,7 +166,7 @@ def test_what_cannot_be_is_said_before_anything_is_kept(experiment, tmp_path):
         ({"reference": [good, good]}, None, "named twice"),
         ({"reference": [good], "flow": [str(small)]}, None, "128 x 96 px"),
         ({"reference": [good]}, 8, "8 bits hold at most 255"),
-        ({"reference": [str(tmp_path / "raw.nef")]}, None, "raw"),
+        ({"reference": [str(tmp_path / "raw.nef")]}, None, "raw.nef cannot be read"),
     ]
     for names, bits, words in table:
         with pytest.raises(BadInputError, match=words):
