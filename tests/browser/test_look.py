@@ -147,6 +147,9 @@ def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: 
     slices.first.hover()
     expect(page.locator(".slice .probe").first).to_contain_text(re.compile(r"°C, ± 0\.196 \(95 %\)"))
     page.get_by_role("checkbox", name="°C").uncheck()
+    # Also what was pointed at before is in kelvin now.
+    expect(page.locator(".slice .probe").first).to_contain_text(re.compile(r"\d K, ± 0\.196 \(95 %\)"))
+    expect(page.locator(".slices, .room3d, .bar").filter(has_text="°C")).to_have_count(0)
     slices.nth(1).hover()
     expect(page.locator(".slice .probe").nth(1)).to_contain_text(re.compile(r"\d K, ±"))
     expect(page.locator(".bar").first).to_contain_text("they have the end's colour")

@@ -11,6 +11,7 @@ from playwright.sync_api import Locator, Page, expect
 from app.client import Client
 from tests.app.api.resources.test_own_rig import room_file
 from tests.browser.conftest import Opens, Station, snapshot
+from tests.browser.test_page import AXE
 from tests.browser.test_story import PAINTED
 
 
@@ -241,6 +242,69 @@ def test_a_person_comes_into_the_room_by_keyboard_alone(station: Station, opens:
     expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
     settings = (station.app.state.services.folders.all()[0] / "experiment.toml").read_text()
     assert "[[scene.objects]]" in settings
+
+
+def test_an_object_is_known_by_its_heat_or_by_its_surfaces_temperature(station: Station, opens: Opens):
+    hand = chosen(station, opens)
+    page = hand.page
+    hand.click(page.get_by_role("button", name="Add object", exact=True))
+    thing = page.get_by_role("group", name="object 1").first
+    thing.get_by_label("What it is").select_option("cabinet")
+    heat = thing.get_by_role("textbox", name="Heat to the air")
+    heat.fill("90")
+    known = thing.get_by_role("combobox", name="Known of it")
+    known.select_option("temperature of its surface")
+    expect(heat).to_have_count(0)
+    warm = thing.get_by_role("textbox", name="Temperature of its surface")
+    warm.fill("-200")
+    expect(page.locator("[id='told-object[0].temperature']")).to_contain_text("between -73 C and 527 C")
+    warm.fill("31")
+    thing.get_by_label("Give or take").fill("0.8")
+    expect(page.locator("button.next")).to_have_text("Create the experiment")
+    # One who comes back to heat has said nothing of a temperature, and can undo it.
+    known.select_option("heat to the air")
+    expect(heat).to_have_value("")
+    page.get_by_role("button", name="Undo").click()
+    expect(warm).to_have_value("31 C")
+    hand.next_step("Create the experiment")
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+    folders = station.app.state.services.folders
+    (cabinet,) = folders.open(folders.all()[0].name).settings.scene.objects
+    assert (cabinet.thermal, cabinet.power_w) == ("temperature", None)
+    assert (cabinet.temperature_k, cabinet.temperature_std_k) == (pytest.approx(304.15), 0.8)
+
+
+@pytest.mark.skipif(not AXE.is_file(), reason="axe-core is not installed; run `python web/hatch_build.py`")
+def test_places_of_the_camera_are_compared_and_one_is_taken_by_keyboard(station: Station, opens: Opens):
+    # axe is run from outside the policy; the page itself is watched under it in every other test.
+    page = opens(station.address, bypass_csp=True).page
+    page.get_by_role("button", name="New experiment").click()
+    page.get_by_role("radio", name=re.compile("packaged room")).check()
+    expect(page.locator("button.next")).to_have_text("Create the experiment")
+    page.get_by_role("button", name="Compare places of the camera").click()
+    spots = page.locator(".places .spot")
+    # The one step that computes: a busy machine may take minutes.
+    expect(spots).to_have_count(49, timeout=600_000)
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    complaints = "async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])"
+    assert page.evaluate(complaints) == []
+    before = page.locator(".places .here").get_attribute("cx")
+    there = page.locator(".places .pick").first
+    there.focus()
+    expect(page.locator(".places figcaption")).to_contain_text("m from the wall: the picture")
+    page.keyboard.press("Enter")
+    place = re.match(r"Put the camera here: x ([-\d.]+) m", there.get_attribute("aria-label") or "")
+    assert place is not None
+    across = page.locator("input[name='camera.position[0]']")
+    expect(across).to_have_value(re.compile(r"^[-\d.]+ m$"))
+    assert float(across.input_value().split()[0]) == pytest.approx(float(place[1]), abs=0.051)
+    expect(page.locator(".places .here")).not_to_have_attribute("cx", before or "")
+    # The map is of another room than the one that is typed now, and says so; of another place it is still true.
+    older = page.get_by_text("The map is of what was typed before")
+    expect(older).to_have_count(0)
+    page.get_by_label("Still air, at the reference").fill("18")
+    expect(older).to_be_visible()
+    snapshot(page, "places")
 
 
 def test_an_opening_is_moved_by_keys_and_by_pointer_and_the_draft_survives_a_reload(
