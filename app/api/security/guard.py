@@ -50,9 +50,22 @@ class Guard:
         streams = scope["path"] in STREAMS
         self._open_streams += streams
         try:
-            await self._pass(scope, self._while_open(scope, receive) if streams else receive, send)
+            await (self._stream if streams else self._pass)(scope, receive, send)
         finally:
             self._open_streams -= streams
+
+    async def _stream(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """An answer without an end of its own. One that began, and that is ended here, is ended as a whole."""
+        open_ = False
+
+        async def watched(message: Message) -> None:
+            nonlocal open_
+            open_ = message["type"] == "http.response.start" or message.get("more_body", False)
+            await send(message)
+
+        await self._pass(scope, self._while_open(scope, receive), watched)
+        if open_:
+            await send({"type": "http.response.body", "body": b""})
 
     async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "websocket":

@@ -285,3 +285,17 @@ def test_streams_beyond_the_limit_are_refused_until_one_is_closed(tmp_path: Path
                     break
             assert time.monotonic() < until_s
             time.sleep(0.05)
+
+
+def test_an_open_stream_ends_with_its_session_and_a_tokens_goes_on(live: Live):
+    with live.client() as holder, httpx.Client(base_url=live.url, timeout=100) as browser:
+        browser.post("/api/session", headers={**live.bearer, "Origin": live.url})
+        with browser.stream("GET", "/api/events") as seen, holder.stream("GET", "/api/events") as other:
+            lines, others = seen.iter_lines(), other.iter_lines()
+            assert next(lines) == next(others) == "retry: 1000"
+            browser.delete("/api/session", headers={"Origin": live.url})
+            until_s = time.monotonic() + 100
+            # A stream never ends by itself: it says that it is still there, for ever.
+            for _ in lines:
+                assert time.monotonic() < until_s
+            assert next(line for line in others if line.startswith(":")) == ": still here"
