@@ -20,8 +20,8 @@ from app.api.models.answers import (
     AnswersResource,
     CheckResource,
     FoundCamera,
-    FoundPort,
     PortAnswer,
+    PortResource,
     TemplateResource,
 )
 from app.api.models.calibrations import CalibrationResource
@@ -32,7 +32,7 @@ from app.api.models.experiments import ExperimentLine, ExperimentResource
 from app.api.models.guide import GuideResource, StepText
 from app.api.models.jobs import Curves, JobResource
 from app.api.models.prints import PrintedResource
-from app.api.models.problem import MEDIA_TYPE, Problem
+from app.api.models.problem import MEDIA_TYPE, ProblemDetails
 from app.api.models.projector import ProjectorResource, WireLine
 from app.api.models.results import ComparisonResource, Form, PresetResource, ResultLine, ResultResource
 from app.api.models.rigs import AddressesResource
@@ -51,7 +51,7 @@ Action = Literal["cancel", "pause", "resume", "retry"]
 class ServiceError(AirlensError):
     """The service refused or failed; `problem` says why and what to do."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: ProblemDetails) -> None:
         super().__init__(problem.detail)
         self.problem = problem
 
@@ -210,9 +210,9 @@ class Client:
         }
         return self._bytes("/devices/found/picture", query).content
 
-    def ports(self) -> list[FoundPort]:
+    def ports(self) -> list[PortResource]:
         """List the serial ports."""
-        return self._ask(list[FoundPort], "GET", "/devices/ports")
+        return self._ask(list[PortResource], "GET", "/devices/ports")
 
     def ask_port(self, device: str) -> PortAnswer:
         """Ask a serial port which projector is there; takes some seconds."""
@@ -564,7 +564,7 @@ def _check(answer: httpx.Response) -> None:
         return
     answer.read()
     if answer.headers.get("content-type") == MEDIA_TYPE:
-        raise ServiceError(Problem.model_validate_json(answer.content))
+        raise ServiceError(ProblemDetails.model_validate_json(answer.content))
     raise AirlensError(f"The service answered {answer.status_code} without an explanation. Is it airlens?")
 
 

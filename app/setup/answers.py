@@ -95,7 +95,7 @@ class ProjectorAnswer(Strict):
     """Its address, where it can be spoken to."""
 
 
-class Opening(Strict):
+class OpeningAnswer(Strict):
     """A rectangle on a wall."""
 
     wall: WallName
@@ -106,7 +106,7 @@ class Opening(Strict):
     """Its larger corner."""
 
 
-class SupplyAnswer(Opening):
+class SupplyAnswer(OpeningAnswer):
     """Air that is blown in, straight off its wall: as volume flow, or as mean speed."""
 
     flow: Flow | None = None
@@ -129,7 +129,7 @@ class SupplyAnswer(Opening):
         return self
 
 
-class OutletAnswer(Opening):
+class OutletAnswer(OpeningAnswer):
     """Where air leaves; a thermometer in it fixes the level of every temperature."""
 
     temperature: Temperature | None = None
@@ -138,7 +138,7 @@ class OutletAnswer(Opening):
     """Standard deviation of it."""
 
 
-class SurfaceAnswer(Opening):
+class SurfaceAnswer(OpeningAnswer):
     """A radiator, a heated floor, a cooled ceiling, a cold window: its surface's temperature."""
 
     temperature: Temperature

@@ -17,7 +17,7 @@ from app.setup.answers import (
     Answers,
     CameraAnswer,
     ObjectAnswer,
-    Opening,
+    OpeningAnswer,
     OutletAnswer,
     ProjectorAnswer,
     SupplyAnswer,
@@ -126,7 +126,7 @@ def _named(parts: Parts, *names: str) -> list[tuple[Path, Any]]:
     return [(path, part) for path, part in parts.items() if path[0] in names]
 
 
-def _openings(parts: Parts) -> list[tuple[Path, Opening]]:
+def _openings(parts: Parts) -> list[tuple[Path, OpeningAnswer]]:
     return _named(parts, "supply", "outlet", "surface")
 
 

@@ -12,7 +12,7 @@ from app.experiment.rig_settings import (
     SimulatedCameraSettings,
     V4l2CameraSettings,
 )
-from app.setup.answers import Answers, CameraAnswer, ObjectAnswer, Opening, SupplyAnswer
+from app.setup.answers import Answers, CameraAnswer, ObjectAnswer, OpeningAnswer, SupplyAnswer
 from app.setup.mistakes import contradictions, field_name
 from app.volume.scene import projected
 from core.air import Air
@@ -231,7 +231,7 @@ def _inlet(item: SupplyAnswer, room: Box) -> Inlet:
     )
 
 
-def _patch(item: Opening, room: Box) -> Patch:
+def _patch(item: OpeningAnswer, room: Box) -> Patch:
     """The rectangle, on its wall."""
     along = face_of(item.wall).along
     first, second = (room.lower_m[axis] for axis in along)

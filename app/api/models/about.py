@@ -2,10 +2,10 @@
 
 from typing import Literal
 
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 
 
-class Health(Strict):
+class Health(WireModel):
     """The service answers; the rest are the margins that an operator watches."""
 
     status: Literal["ok", "disk_low"]
@@ -14,7 +14,7 @@ class Health(Strict):
     load_per_core: float
 
 
-class About(Strict):
+class About(WireModel):
     """Versions and the machine."""
 
     name: Literal["airlens"]

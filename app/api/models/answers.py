@@ -5,10 +5,10 @@ from typing import Any, Literal
 from pydantic import Field
 
 from app.api.models.calibrations import StandingResource
-from app.api.models.strict import Named, Strict
+from app.api.models.strict import Named, WireModel
 
 
-class TemplateResource(Strict):
+class TemplateResource(WireModel):
     """Filled-in answers to start from."""
 
     template: str
@@ -16,7 +16,7 @@ class TemplateResource(Strict):
     answers: dict[str, Any]
 
 
-class FoundFormat(Strict):
+class FoundFormat(WireModel):
     """A format of a camera, at one size."""
 
     pixel_format: str
@@ -25,7 +25,7 @@ class FoundFormat(Strict):
     height_px: int
 
 
-class FoundCamera(Strict):
+class FoundCamera(WireModel):
     """A camera to choose, with what it would be asked for; `error` says why it cannot be used."""
 
     kind: Literal["v4l2", "aravis", "simulated"]
@@ -39,20 +39,20 @@ class FoundCamera(Strict):
     formats: tuple[FoundFormat, ...] = ()
 
 
-class FoundPort(Strict):
+class PortResource(WireModel):
     """A serial port, as the system describes it."""
 
     device: str
     description: str
 
 
-class AskPort(Strict):
+class AskPort(WireModel):
     """A serial port that was listed."""
 
     device: str = Field(max_length=1000)
 
 
-class PortAnswer(Strict):
+class PortAnswer(WireModel):
     """Who answered on a port: the address to speak to it by, its name, its power state."""
 
     found: bool
@@ -61,27 +61,27 @@ class PortAnswer(Strict):
     power: str = ""
 
 
-class SentAnswers(Strict):
+class SentAnswers(WireModel):
     """Answers, for a new experiment or for the one that is named."""
 
     answers: dict[str, Any] = Field(max_length=100)
     experiment: Named | None = None
 
 
-class NewAnswers(Strict):
+class NewAnswers(WireModel):
     """Answers as answers.toml holds them."""
 
     answers: dict[str, Any] = Field(max_length=100)
 
 
-class MistakeResource(Strict):
+class MistakeResource(WireModel):
     """What is wrong at one field, such as `supply[0].flow`."""
 
     field: str
     sentence: str
 
 
-class SupplyTold(Strict):
+class SupplyTold(WireModel):
     """What a supply's answer means."""
 
     field: str
@@ -89,7 +89,7 @@ class SupplyTold(Strict):
     flow_m3_h: float
 
 
-class RoomTold(Strict):
+class RoomTold(WireModel):
     """What the answers make: the picture on the patterned wall and the wall itself (width, height), the room's two
     corners, the supplies, who stands where, and the settings in SI."""
 
@@ -101,14 +101,14 @@ class RoomTold(Strict):
     settings: dict[str, Any]
 
 
-class CheckResource(Strict):
+class CheckResource(WireModel):
     """Every mistake in answers; `told` where there is none."""
 
     mistakes: list[MistakeResource]
     told: RoomTold | None
 
 
-class AnswersResource(Strict):
+class AnswersResource(WireModel):
     """The answers of an experiment; `unsaid` tells what they leave out and a change leaves as it is; `revision` goes
     into the `If-Match` of a change."""
 

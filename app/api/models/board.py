@@ -2,11 +2,11 @@
 
 from pydantic import Field
 
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 from calibration.board_kind import BoardKind
 
 
-class BoardGeometry(Strict):
+class BoardGeometry(WireModel):
     """A board: inner corners of a chessboard, squares of a ChArUco board, circles."""
 
     kind: BoardKind = "chessboard"

@@ -2,10 +2,10 @@
 
 from typing import Literal
 
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 
 
-class CalibrationItem(Strict):
+class CalibrationItem(WireModel):
     """One thing to calibrate, in words for the operator: measured from images, given, or missing."""
 
     name: str
@@ -14,7 +14,7 @@ class CalibrationItem(Strict):
     advice: str
 
 
-class StandingResource(Strict):
+class StandingResource(WireModel):
     """Where a camera or a projector stands, and where the corners of its picture meet the back wall [m]."""
 
     name: str
@@ -23,7 +23,7 @@ class StandingResource(Strict):
     corners_m: list[list[float]]
 
 
-class CalibrationResource(Strict):
+class CalibrationResource(WireModel):
     """The calibration of an experiment; `room_m` are the room's lower and upper corner.
 
     Incomplete while a part that the rig needs is missing: camera, wall, and the projector where it is the light.
@@ -36,7 +36,7 @@ class CalibrationResource(Strict):
     rig: list[StandingResource]
 
 
-class NewCalibration(Strict):
+class NewCalibration(WireModel):
     """A simulated rig takes its models from its scene; a real one is calibrated on the command line."""
 
     kind: Literal["simulated"]

@@ -4,12 +4,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from app.api.models.strict import Named, Strict
+from app.api.models.strict import Named, WireModel
 
 Role = Literal["reference", "flow", "dark", "flat"]
 
 
-class DeskResource(Strict):
+class DeskResource(WireModel):
     """The capture that is being taken, or the last one.
 
     `done` of `total` frames are taken of burst number `burst` of `bursts`.
@@ -28,7 +28,7 @@ class DeskResource(Strict):
     reason: str
 
 
-class NewCapture(Strict):
+class NewCapture(WireModel):
     """A burst, or several: every field by the name that it has on the command line and in the manifest.
 
     `exposure_s` and `gain` hold for this capture; left out, they are the camera's own. `minutes_on` says how
@@ -50,14 +50,14 @@ class NewCapture(Strict):
     minutes_on: float | None = Field(default=None, ge=0, le=1e6)
 
 
-class RolePictures(Strict):
+class RolePictures(WireModel):
     """Uploaded pictures of one role: each upload is a picture, or a TIFF of many."""
 
     role: Role
     uploads: list[Named] = Field(min_length=1, max_length=1000)
 
 
-class NewImport(Strict):
+class NewImport(WireModel):
     """Pictures that another camera took. `bits` are those of the counts where the files hold more."""
 
     pictures: list[RolePictures] = Field(min_length=1, max_length=4)
@@ -65,13 +65,13 @@ class NewImport(Strict):
     ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
 
 
-class Abort(Strict):
+class Abort(WireModel):
     """What becomes of the frames that were taken."""
 
     discard: bool = False
 
 
-class VerdictResource(Strict):
+class VerdictResource(WireModel):
     """One judgement of a burst: `value` against `expected`, and what to do when it is not good."""
 
     name: str
@@ -81,7 +81,7 @@ class VerdictResource(Strict):
     advice: str
 
 
-class SettingResource(Strict):
+class SettingResource(WireModel):
     """A setting as asked for and as granted; null where the camera has no such control."""
 
     name: str
@@ -89,7 +89,7 @@ class SettingResource(Strict):
     granted: float | None
 
 
-class CaptureResource(Strict):
+class CaptureResource(WireModel):
     """One capture. `interrupted` ones have no manifest and are never used as a measurement.
 
     `sequence` is the same for all bursts of one sequence, and none for a single burst.
@@ -111,7 +111,7 @@ class CaptureResource(Strict):
     reason: str = ""
 
 
-class CaptureChange(Strict):
+class CaptureChange(WireModel):
     """What people wrote about it."""
 
     notes: str = Field(max_length=10_000)

@@ -4,10 +4,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from app.api.models.strict import Named, Strict
+from app.api.models.strict import Named, WireModel
 
 
-class CameraResource(Strict):
+class CameraResource(WireModel):
     """The camera; numbers are null until it is open."""
 
     device: Literal["camera"] = "camera"
@@ -23,21 +23,21 @@ class CameraResource(Strict):
     reason: str
 
 
-class OpenCamera(Strict):
+class OpenCamera(WireModel):
     """Which rig to connect; `air` is what a simulated room does."""
 
     experiment: Named
     air: Literal["still", "moving"] = "still"
 
 
-class CameraChange(Strict):
+class CameraChange(WireModel):
     """What to set; what is left out stays."""
 
     exposure_s: float | None = Field(default=None, gt=0, le=60)
     gain: float | None = Field(default=None, ge=0, le=1000)
 
 
-class Asked(Strict):
+class Asked(WireModel):
     """What a viewer sends: how many frames it can take now, and how it wants them."""
 
     credits: int = Field(default=1, ge=0, le=8)

@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 
 
-class EventResource(Strict):
+class EventResource(WireModel):
     """Something that happened; `id` only grows."""
 
     id: int

@@ -5,10 +5,10 @@ from typing import Any, Literal
 from pydantic import Field
 
 from app.api.models.board import BoardGeometry
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 
 
-class NextResource(Strict):
+class NextResource(WireModel):
     """The first step of the work that is not done, the command that does it, and why."""
 
     step: Literal[
@@ -27,7 +27,7 @@ class NextResource(Strict):
     reason: str
 
 
-class ExperimentLine(Strict):
+class ExperimentLine(WireModel):
     """One line of the list of experiments; `uncalibrated` names the parts of the rig that need it still.
 
     `reason` says what is wrong with an experiment that cannot be read: then only its name and date are known.
@@ -57,7 +57,7 @@ class ExperimentResource(ExperimentLine):
     settings: dict[str, Any]
 
 
-class NewExperiment(Strict):
+class NewExperiment(WireModel):
     """A simulated rig before the packaged room; real rigs are described in experiment.toml."""
 
     kind: Literal["simulated"]
@@ -68,7 +68,7 @@ class NewExperiment(Strict):
     world: Literal["ideal", "lab"] = "lab"
 
 
-class ExperimentChange(Strict):
+class ExperimentChange(WireModel):
     """What people wrote about it, and the board that its rig is calibrated with."""
 
     title: str | None = Field(default=None, max_length=200)

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.api.models.board import BoardGeometry
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 
 StepText = Literal["camera", "projector", "wall", "response"]
 
@@ -14,7 +14,7 @@ StepText = Literal["camera", "projector", "wall", "response"]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
-class WantedResource(Strict):
+class WantedResource(WireModel):
     """What to arrange next, in words; a board's place as parts of the picture, and which edge is nearer."""
 
     kind: Literal["board", "place", "wall", "level", "dark", "light"]
@@ -27,7 +27,7 @@ class WantedResource(Strict):
     roll_deg: float
 
 
-class GuideView(Strict):
+class GuideView(WireModel):
     """One view of the board; retake it by its name."""
 
     name: str
@@ -36,7 +36,7 @@ class GuideView(Strict):
     issues: list[str]
 
 
-class GuideResource(Strict):
+class GuideResource(WireModel):
     """A guided calibration. While `state` is running, `done` of `total` pictures of `wanted` are taken.
 
     `busy` is true also while another step, or another experiment's, takes pictures: none can be begun.
@@ -65,7 +65,7 @@ class GuideResource(Strict):
     advice: list[str]
 
 
-class GuideRequest(Strict):
+class GuideRequest(WireModel):
     """Which step, and how; without a board, the experiment's own is used (rehearsals have one).
 
     `anchor` is a wall point seen at u, v whose world x, z [m] were measured.

@@ -4,12 +4,12 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from app.api.models.strict import Named, Strict
+from app.api.models.strict import Named, WireModel
 
 State = Literal["queued", "running", "pausing", "cancelling", "paused", "lost", "done", "failed", "cancelled"]
 
 
-class JobResource(Strict):
+class JobResource(WireModel):
     """One job. `state` is the ledger's word; `reason` says why it waits or how it ended."""
 
     job: str
@@ -33,7 +33,7 @@ class JobResource(Strict):
     finished_s: float | None
 
 
-class NewJob(Strict):
+class NewJob(WireModel):
     """What to compute. The same `key` twice gives the first job, so that a request may be repeated."""
 
     kind: str = Field(min_length=1, max_length=64)
@@ -45,14 +45,14 @@ class NewJob(Strict):
     group: Named | None = None
 
 
-class JobChange(Strict):
+class JobChange(WireModel):
     """A new priority, or a new place: before another waiting job, or last."""
 
     priority: int | None = Field(default=None, ge=-1000, le=1000)
     before: Named | None = None
 
 
-class Curves(Strict):
+class Curves(WireModel):
     """What a job told while it ran, as columns of equal length; null where a value was not finite."""
 
     step: list[int]

@@ -5,10 +5,10 @@ from typing import Literal
 from pydantic import Field
 
 from app.api.models.board import BoardGeometry
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 
 
-class NewPattern(Strict):
+class NewPattern(WireModel):
     """Sheets of the wall's pattern; `choose` first gives the scene the finest pattern that suits its camera."""
 
     paper: str = Field(default="a3", max_length=20)
@@ -16,14 +16,14 @@ class NewPattern(Strict):
     choose: bool = False
 
 
-class NewBoard(Strict):
+class NewBoard(WireModel):
     """A board to calibrate with: the rig's own unless given. Without `square_m` the largest that fits the paper."""
 
     paper: str = Field(default="a3", max_length=20)
     board: BoardGeometry | None = None
 
 
-class PrintedResource(Strict):
+class PrintedResource(WireModel):
     """A PDF that was made: rows and columns of its sheets, what is on them, and the finest period."""
 
     what: Literal["pattern", "board"]

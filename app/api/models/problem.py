@@ -15,7 +15,7 @@ class FieldError(BaseModel):
     message: str
 
 
-class Problem(BaseModel):
+class ProblemDetails(BaseModel):
     """RFC 9457 problem details. `detail` is written for the operator and is shown as it is.
 
     `current` and `sent` are both versions of what somebody else changed meanwhile (code `changed`).

@@ -4,10 +4,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from app.api.models.strict import Named, Strict
+from app.api.models.strict import Named, WireModel
 
 
-class ProjectorResource(Strict):
+class ProjectorResource(WireModel):
     """The projector; what it does not know is null. `for_s` is how long it has been in this state."""
 
     device: Literal["projector"] = "projector"
@@ -25,13 +25,13 @@ class ProjectorResource(Strict):
     reason: str
 
 
-class OpenProjector(Strict):
+class OpenProjector(WireModel):
     """Which rig's projector to speak to."""
 
     experiment: Named
 
 
-class ProjectorChange(Strict):
+class ProjectorChange(WireModel):
     """What to tell it; what is left out stays. Power takes minutes: `state` says how far it is."""
 
     power: Literal["on", "off"] | None = None
@@ -40,7 +40,7 @@ class ProjectorChange(Strict):
     frozen: bool | None = None
 
 
-class WireLine(Strict):
+class WireLine(WireModel):
     """One piece of traffic: > sent, < received, ! a remark; control bytes are spelled out."""
 
     at_s: float

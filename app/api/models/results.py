@@ -2,20 +2,20 @@
 
 from typing import Any, Literal
 
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 
 Kind = Literal["found", "derived", "uncertainty", "truth", "error"]
 Form = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf", "pvd"]
 
 
-class PresetResource(Strict):
+class PresetResource(WireModel):
     """A named way to solve."""
 
     preset: str
     about: str
 
 
-class ResultLine(Strict):
+class ResultLine(WireModel):
     """One line of the list of results. `interrupted` ones have no manifest and are never used.
 
     `reason` says why a `broken` one cannot be read.
@@ -29,7 +29,7 @@ class ResultLine(Strict):
     reason: str = ""
 
 
-class FieldResource(Strict):
+class FieldResource(WireModel):
     """One scalar on the result's vertices; `low` and `high` leave out the walls, and a hundredth on each side."""
 
     name: str
@@ -43,7 +43,7 @@ class FieldResource(Strict):
     mean: float
 
 
-class FoundResource(Strict):
+class FoundResource(WireModel):
     """Something before the wall that was not stated, and the box that would hide as much.
 
     `solved`: the air was solved with it. `answer` is the object to add to the experiment's answers; `entry` states
@@ -59,7 +59,7 @@ class FoundResource(Strict):
     entry: str
 
 
-class ResultResource(Strict):
+class ResultResource(WireModel):
     """A result: its grid, its fields, how it ended, and the manifest that says where it came from.
 
     `time_s` is when each burst of a sequence began; fields of a burst are asked for as NAME.NUMBER, from 0.
@@ -79,7 +79,7 @@ class ResultResource(Strict):
     manifest: dict[str, Any]
 
 
-class ScoreResource(Strict):
+class ScoreResource(WireModel):
     """One figure against the truth, in words."""
 
     name: str
@@ -87,7 +87,7 @@ class ScoreResource(Strict):
     unit: str
 
 
-class ReadingResource(Strict):
+class ReadingResource(WireModel):
     """One quantity at one point sensor: measured, with its standard deviation, and found there."""
 
     name: str
@@ -98,7 +98,7 @@ class ReadingResource(Strict):
     found: float
 
 
-class ComparisonResource(Strict):
+class ComparisonResource(WireModel):
     """A result against what is known better; empty lists where nothing is."""
 
     scores: list[ScoreResource]

@@ -2,13 +2,13 @@
 
 from typing import Literal
 
-from app.api.models.strict import Named, Strict
+from app.api.models.strict import Named, WireModel
 
 PatternName = Literal["scene", "identify", "focus", "white", "grey", "black"]
 State = Literal["empty", "waiting", "showing", "refused", "away"]
 
 
-class ScreenResource(Strict):
+class ScreenResource(WireModel):
     """`showing` means that the kiosk page drew the picture and read back the very same pixels."""
 
     device: Literal["screen"] = "screen"
@@ -20,7 +20,7 @@ class ScreenResource(Strict):
     page: str = "/kiosk/page"
 
 
-class ShowPattern(Strict):
+class ShowPattern(WireModel):
     """Which pattern of which experiment's projector."""
 
     experiment: Named

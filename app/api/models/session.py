@@ -2,10 +2,10 @@
 
 from typing import Literal
 
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 
 
-class Session(Strict):
+class Session(WireModel):
     """Whether the browser holds the cookie that opens the service."""
 
     state: Literal["open", "closed"]

@@ -1,9 +1,9 @@
 """How far the picture moved since the reference."""
 
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 
 
-class ShiftResource(Strict):
+class ShiftResource(WireModel):
     """Shifts in camera pixels, (columns, rows), against the newest reference; `drift_px` is the border's."""
 
     reference: str

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 Named = Annotated[str, Field(max_length=100)]
 
 
-class Strict(BaseModel):
+class WireModel(BaseModel):
     """No coercion (`false` is not 0.0), no unknown fields, no NaN, no change after validation."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)

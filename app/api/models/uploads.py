@@ -4,10 +4,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from app.api.models.strict import Strict
+from app.api.models.strict import WireModel
 
 
-class UploadedArray(Strict):
+class UploadedArray(WireModel):
     """One array of an upload."""
 
     name: str
@@ -19,7 +19,7 @@ class UploadedArray(Strict):
     nonfinite: int
 
 
-class Upload(Strict):
+class Upload(WireModel):
     """A file that was checked, read and kept; `reason` says why a `broken` one cannot be read any more."""
 
     upload: str

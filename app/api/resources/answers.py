@@ -13,10 +13,10 @@ from app.api.models.answers import (
     AskPort,
     CheckResource,
     FoundCamera,
-    FoundPort,
     MistakeResource,
     NewAnswers,
     PortAnswer,
+    PortResource,
     RoomTold,
     SentAnswers,
     SupplyTold,
@@ -89,9 +89,9 @@ def read_found_picture(
 
 
 @router.get("/devices/ports")
-def list_ports(given: Given) -> list[FoundPort]:
+def list_ports(given: Given) -> list[PortResource]:
     """List the serial ports; none is opened."""
-    return [FoundPort.of(one) for one in found_ports()]
+    return [PortResource.of(one) for one in found_ports()]
 
 
 @router.post("/devices/ports/ask")

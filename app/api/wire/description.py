@@ -5,9 +5,9 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from app.api.models.problem import MEDIA_TYPE, Problem
+from app.api.models.problem import MEDIA_TYPE, ProblemDetails
 
-PROBLEM = {"$ref": "#/components/schemas/Problem"}
+PROBLEM = {"$ref": "#/components/schemas/ProblemDetails"}
 ERROR = {"description": "What happened, why, and what to do.", "content": {MEDIA_TYPE: {"schema": PROBLEM}}}
 
 
@@ -35,8 +35,8 @@ def _description(app: FastAPI) -> dict[str, Any]:
     schemas = components.setdefault("schemas", {})
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
-    described = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
-    schemas.update({**described.pop("$defs", {}), "Problem": described})
+    described = ProblemDetails.model_json_schema(ref_template="#/components/schemas/{model}")
+    schemas.update({**described.pop("$defs", {}), "ProblemDetails": described})
     components["securitySchemes"] = {"bearer": {"type": "http", "scheme": "bearer"}}
     found["security"] = [{"bearer": []}]
     return found

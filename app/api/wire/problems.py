@@ -7,7 +7,7 @@ from typing import Any
 
 from starlette.exceptions import HTTPException
 
-from app.api.models.problem import FieldError, Problem
+from app.api.models.problem import FieldError, ProblemDetails
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ KINDS: Mapping[str, Kind] = {
 
 
 class ApiError(HTTPException):
-    """A foreseen refusal or failure; raised anywhere below the guard, shown as a `Problem`."""
+    """A foreseen refusal or failure; raised anywhere below the guard, shown as a `ProblemDetails`."""
 
     def __init__(
         self,
@@ -82,13 +82,13 @@ class ApiError(HTTPException):
         self.current, self.sent = current, sent
 
 
-def problem_of(error: ApiError, instance: str | None = None) -> Problem:
+def problem_of(error: ApiError, instance: str | None = None) -> ProblemDetails:
     """Return the problem that describes `error`."""
     kind = KINDS[error.code]
     next_step = error.next_step or kind.next_step
     cause = error.cause.strip()
     detail = cause if next_step in cause else f"{cause} {next_step}"
-    return Problem(
+    return ProblemDetails(
         type=f"urn:airlens:problem:{error.code}",
         title=kind.title,
         status=kind.status,

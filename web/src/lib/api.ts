@@ -1,6 +1,6 @@
 // The service's resources. A request is written as in its description, "GET /jobs/{job}", and the types of
 // what it takes and answers follow from that. Errors are the service's own words, shown as they are.
-import type { paths, Problem as Told } from "./schema";
+import type { paths, ProblemDetails as Told } from "./schema";
 
 /** What the page needs of a refusal; what lies beyond the service has no more. */
 export type Problem = Pick<Told, "code" | "title" | "detail" | "status"> & {
