@@ -376,12 +376,14 @@ class Client:
         information: str | None = None,
         board: Mapping[str, Any] | None = None,
         revision: str | None = None,
+        marks: Sequence[Mapping[str, Any]] | None = None,
     ) -> ExperimentResource:
-        """Change title, notes, or the board to calibrate with: the fields of BoardGeometry.
+        """Change title, notes, the board to calibrate with (the fields of BoardGeometry), or the marks (MarksModel).
 
         With the `revision` that was read, a change is refused where somebody else changed it meanwhile.
         """
-        body = {"title": title, "information": information, "board": board}
+        drawn = None if marks is None else [dict(one) for one in marks]
+        body = {"title": title, "information": information, "board": board, "marks": drawn}
         return self._ask(ExperimentResource, "PATCH", f"/experiments/{experiment}", body, revision=revision)
 
     def addresses(self, experiment: str) -> AddressesResource:

@@ -115,6 +115,28 @@ Light = FixedTexture | ProjectedPattern
 
 
 @setting
+class Marks:
+    """A rectangle of the picture in which a still board or marks stand, with none of the room's air before them.
+
+    They hide the wall. What they do between two exposures is what the camera did.
+    """
+
+    name: str
+    """What they are called in what is told of them."""
+    lower_px: Vector2
+    """Its upper left corner: column and row, counted from the middle of the first pixel."""
+    upper_px: Vector2
+    """Its lower right corner."""
+
+    def __post_init__(self) -> None:
+        if not all(low < high for low, high in zip(self.lower_px, self.upper_px, strict=True)):
+            raise SettingError(
+                f"The marks {self.name!r} have no area: {self.lower_px} to {self.upper_px} px. "
+                "Give lower_px below upper_px, column and row, in pixels of the picture."
+            )
+
+
+@setting
 class View:
     """One camera and the wall that it looks at. `frames` are averaged into one image."""
 
@@ -136,11 +158,26 @@ class View:
     """Focal length of the lens."""
     drift_std_px: float = 1.0
     """Standard deviation of the mount's motion between exposures, at the picture's edge; 0: it stands still."""
+    marks: tuple[Marks, ...] = ()
+    """Where something still near the camera tells how the camera moved."""
 
     def __post_init__(self) -> None:
         check_range(
             "drift_std_px", self.drift_std_px, 0.0, 100.0, "px", "A mount creeps by 0.1 to 1 px in minutes."
         )
+        names = [marks.name for marks in self.marks]
+        if len(set(names)) < len(names):
+            raise SettingError(
+                f"The marks of view {self.name!r} are called {', '.join(names)}; give each a name of its own."
+            )
+        width, height = self.camera.width_px, self.camera.height_px
+        for marks in self.marks:
+            right, down = marks.upper_px
+            if not (min(marks.lower_px) >= -0.5 and right <= width - 0.5 and down <= height - 0.5):
+                raise SettingError(
+                    f"The marks {marks.name!r} reach from {marks.lower_px} to {marks.upper_px} px; the picture of "
+                    f"{self.name!r} has {width} x {height} px. Draw them within it."
+                )
         check_range("frames", self.frames, 1, 1_000_000, "", "One image is the mean of at least one frame.")
         if self.f_number is not None:
             check_range(

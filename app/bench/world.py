@@ -6,6 +6,7 @@ Everything goes through whole pictures and the product's own steps: simulate, re
 import json
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -72,10 +73,12 @@ def measured(
     seed: int,
 ) -> dict[str, Any]:
     """Simulate, reconstruct and score one case."""
-    camera = case.camera(seed)
+    camera, options = case.camera(seed), replace(options, marks=case.marks)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "experiment"
-        simulate(truth, folder, options, information, camera, misreads=case.misreads)
+        simulate(
+            truth, folder, options, information, camera, misreads=case.misreads, bracketed=case.bracketed
+        )
         began_s = time.process_time()
         found = reconstruct(folder, preset)
         scores = score_experiment(folder, truth)

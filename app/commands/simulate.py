@@ -54,9 +54,19 @@ def simulate(
         float | None, typer.Option(min=0.0, help="Drift between exposures [px]: in a lab 0.3, ideal 0.1.")
     ] = None,
     border: Annotated[
-        Literal["print", "bare"] | None,
-        typer.Option(help="Beyond the wall: nothing to see (lab), or a still print (ideal)."),
+        Literal["print", "bare", "room"] | None,
+        typer.Option(
+            help="Beyond the wall: nothing to see (lab), a still print (ideal), or the room's other walls."
+        ),
     ] = None,
+    marks: Annotated[
+        bool,
+        typer.Option("--marks", help="Two still boards near the camera, in the picture's upper corners."),
+    ] = False,
+    bracketed: Annotated[
+        bool,
+        typer.Option("--bracketed", help="A second reference after the flow, as capture series takes it."),
+    ] = False,
     misread: Annotated[
         bool | None,
         typer.Option("--misread/--exact", help="Whether entries are as wrong as stated; in a lab they are."),
@@ -94,6 +104,7 @@ def simulate(
         baseline_m=rig_baseline_m if baseline is None else baseline,
         pattern_seed=seed,
         walls=parse_walls(views),
+        marks=marks,
     )
     shown = changed(WORLDS[world], nuisance or [], drift_px, border, misread)
     camera = shown.camera(seed, noise_free).model_copy(update={"frame_rate_hz": frame_rate})
@@ -113,6 +124,7 @@ def simulate(
             camera,
             stage,
             misreads=shown.misreads,
+            bracketed=bracketed,
             snapshots_path=snapshots,
         )
     typer.echo(f"{experiment}: reference and flow captured. Next: airlens reconstruct {experiment}")

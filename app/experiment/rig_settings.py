@@ -35,6 +35,8 @@ class World(Strict):
     """Share by which the light changes from frame to frame."""
     hot_pixels: Annotated[float, Field(ge=0, le=0.1)] = 0.0
     """Share of the pixels that are always full."""
+    marks_blur_px: Annotated[float, Field(ge=0, le=50)] = 0.0
+    """Blur of marks near the camera, out of focus: standard deviation of the spot."""
     covered: Annotated[float, Field(ge=0, le=0.9)] = 0.0
     """Share of the picture behind things before the wall; every second one moves between bursts."""
 
@@ -56,8 +58,8 @@ class SimulatedCameraSettings(Strict):
     """Of noise and drift."""
     drift_px: Annotated[float, Field(ge=0, le=20)] = 0.0
     """How far the camera moves between reference and flow."""
-    border: Literal["print", "bare"] = "print"
-    """What is beyond the wall: a still print, or nothing to see."""
+    border: Literal["print", "bare", "room"] = "print"
+    """What is beyond the wall: a still print, nothing to see, or the room's other walls behind the same air."""
     noise_free: bool = False
     """Whether its frames have no noise."""
     world: World = World()

@@ -34,7 +34,7 @@ def _correlation(scene: Scene, view: int, image: Float32[np.ndarray, "rows cols"
     cols, rows = min(_CROP_PX, camera.width_px), min(_CROP_PX, camera.height_px)
     left, top = (camera.width_px - cols) // 2, (camera.height_px - rows) // 2
     middle = crop(camera, slice(top, top + rows), slice(left, left + cols))
-    views = [replace(v, camera=middle) if i == view else v for i, v in enumerate(scene.views)]
+    views = [replace(v, camera=middle, marks=()) if i == view else v for i, v in enumerate(scene.views)]
     rendered = render_reference(replace(scene, views=tuple(views)), view)
     captured = image[top : top + rows, left : left + cols]
     if rendered.std() == 0 or captured.std() == 0:

@@ -1,47 +1,33 @@
 """The camera's motion between two exposures: read off what is still, and what stays unknown of it.
 
-A part of the picture beyond the back wall is still if it moves like a rigid picture: the camera's motion is read off
-it. Where there is none, or air of the room is before it too, the motion stays in the shifts, with the mount's
-stability as its prior. The solvers then marginalise it (`core.motion`).
+Marks that somebody drew, or a part of the picture beyond the back wall, are still if they move like a rigid picture:
+the camera's motion is read off them. Where there is none, or air of the room is before them too, the motion stays in
+the shifts, with the mount's stability as its prior. The solvers then marginalise it (`core.motion`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Float
 
+from app.reconstruct.yardstick import (
+    Exposures,
+    Mask,
+    Rigid,
+    Trusted,
+    Yardstick,
+    aligned,
+    read_motion,
+    trusted,
+)
 from core.displacement import measure_shift
-from core.drift import Similarity, fit_similarity, move_image
+from core.drift import Similarity
 from core.motion import CameraMotion
 from core.problem import ShiftMeasurement
 
-Mask = Bool[np.ndarray, " windows"]
-
-# A drift below this moves no window by more than the noise of a hundred frames.
-_SMALL_DRIFT_PX = 2e-3
-_PASSES = 3
-# What a rigid motion leaves of a still border has a mean square of 1 over its noise, which the noise model may have
-# wrong by this factor; chance adds at most so many standard deviations (one still border in 30,000 is refused).
-_NOISE_FACTOR, _SIGMAS = 1.3, 4.0
 # A motion is never known better than this.
 _LEAST_PX = 1e-4
-# Fewer windows than this say nothing of a rigid motion.
-_LEAST_WINDOWS = 12
-
-
-@dataclass(frozen=True)
-class Exposures:
-    """The two pictures of a view, the variance of their difference, and the windows' width."""
-
-    before: Float32[np.ndarray, "rows cols"]
-    after: Float32[np.ndarray, "rows cols"]
-    variance: Float32[np.ndarray, "rows cols"]
-    window_px: int
-
-    @property
-    def size_px(self) -> tuple[int, int]:
-        """Width and height."""
-        return self.before.shape[1], self.before.shape[0]
 
 
 @dataclass(frozen=True)
@@ -100,88 +86,59 @@ class Agreement:
 
 def agreement(before: Exposures, in_room: Mask) -> Agreement:
     """Two references, seen through still air: every window of the wall is a yardstick."""
-    shift, drift = _aligned(before, in_room)
-    good = _good(shift, in_room)
-    rest, _ = fit_similarity(shift, good, before.before.shape)
-    left_px = shift.displacement_px - rest.displacement_px(shift.centres_px, before.before.shape)
-    unlike, total = _mean_square(shift, left_px, good), rest.after(drift)
-    half = max(before.size_px) / 2
+    read, half = read_motion(before, in_room), max(before.size_px) / 2
+    total = read.motion
     edge_px = np.array([total.column_px, total.row_px, half * total.rotation_rad, half * total.dilation])
-    return Agreement(total, edge_px, unlike, _is_noise(unlike, int(good.sum())))
+    return Agreement(total, edge_px, read.unlike, read.is_rigid)
 
 
 def without_known_drift(
-    exposures: Exposures, in_room: Mask, beyond: Mask, prior: MotionPrior
+    exposures: Exposures,
+    in_room: Mask,
+    border: Mask,
+    prior: MotionPrior,
+    marks: Sequence[Yardstick] = (),
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     """The shift of every window, the motion that was taken out of it, and a sentence on it.
 
-    `in_room` are the windows on the back wall, `beyond` those that may be still.
+    `in_room` are the windows on the back wall, `border` those beyond it that may be still; `marks` come first.
     """
-    shift, drift = _aligned(exposures, beyond)
-    rest, covariance = fit_similarity(shift, _good(shift, beyond), exposures.before.shape)
-    shape = exposures.before.shape
-    left_px = shift.displacement_px - rest.displacement_px(shift.centres_px, shape)
-    unlike = _mean_square(shift, left_px, _good(shift, beyond))
-    rigid = _is_noise(unlike, int(beyond.sum()))
-    root_px = _root_px(covariance, exposures.size_px)
-    known = float(np.linalg.norm(root_px, axis=0).max()) < prior.std_px
-    if known and rigid:
-        still = rest.displacement_px(shift.centres_px, exposures.before.shape)
-        motion = CameraMotion(exposures.size_px, max(1.0, unlike) ** 0.5 * root_px)
-        shift = replace(shift, displacement_px=shift.displacement_px - still, motion=motion)
-        return shift, rest.after(drift), _told(rest.after(drift))
+    still = trusted(exposures, marks) if marks else Trusted((), None, ())
+    said = "".join(f"{why} " for why in still.refused)
+    if still.read is not None:
+        if still.read.std_px < prior.std_px:
+            return _known(exposures, still.read, said, f"the {_listed(still.names)}")
+        said += f"The {_listed(still.names)} show too little to tell the camera's motion. "
+    read = read_motion(exposures, border)
+    known = read.std_px < prior.std_px
+    if known and read.is_rigid:
+        return _known(exposures, read, said, "the border")
     if prior.std_px == 0.0:
         shift = measure_shift(exposures.before, exposures.after, exposures.variance, exposures.window_px)
-        return shift, Similarity(), "The camera is stated to stand still between the exposures."
-    shift, drift = _aligned(exposures, in_room)
+        return shift, Similarity(), f"{said}The camera is stated to stand still between the exposures."
+    shift, drift = aligned(exposures, in_room)
     moved, expected = (
         motion.displacement_px(shift.centres_px, exposures.before.shape) for motion in (drift, prior.mean)
     )
     motion = CameraMotion(exposures.size_px, prior.std_px * np.eye(4))
     shift = replace(shift, displacement_px=shift.displacement_px + moved - expected, motion=motion)
-    return shift, prior.mean, _unknown(drift, prior, unlike if known else None)
+    return shift, prior.mean, said + _unknown(drift, prior, read.unlike if known else None)
 
 
-def _is_noise(mean_square: float, windows: int) -> bool:
-    """Whether what a motion leaves of so many windows is their noise."""
-    return mean_square <= _NOISE_FACTOR * (1.0 + _SIGMAS / max(windows, 1) ** 0.5)
+def _known(
+    exposures: Exposures, read: Rigid, said: str, source: str
+) -> tuple[ShiftMeasurement, Similarity, str]:
+    motion = CameraMotion(exposures.size_px, max(1.0, read.unlike) ** 0.5 * read.root_px)
+    return replace(read.shift, motion=motion), read.motion, said + _told(read.motion, source)
 
 
-def _aligned(exposures: Exposures, yardstick: Mask) -> tuple[ShiftMeasurement, Similarity]:
-    """The shifts that are left when the reference is moved as the yardstick moved, and that motion."""
-    moved, drift, shape = exposures.before, Similarity(), exposures.before.shape
-    for _ in range(_PASSES if yardstick.sum() >= _LEAST_WINDOWS else 0):
-        shift = measure_shift(moved, exposures.after, exposures.variance, exposures.window_px, follow=False)
-        rest, _ = fit_similarity(shift, _good(shift, yardstick), shape)
-        if max(abs(rest.column_px), abs(rest.row_px)) < _SMALL_DRIFT_PX:
-            break
-        drift = rest.after(drift)
-        moved = move_image(exposures.before, drift)
-    return measure_shift(moved, exposures.after, exposures.variance, exposures.window_px), drift
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def _good(shift: ShiftMeasurement, chosen: Mask) -> Mask:
-    return chosen if shift.refused is None else chosen & ~shift.refused
-
-
-def _mean_square(shift: ShiftMeasurement, left_px: Float[np.ndarray, "windows 2"], chosen: Mask) -> float:
-    """Mean square over the noise of what a fitted motion leaves of some windows."""
-    squares = np.einsum("wa,wab,wb->w", left_px, shift.information_per_px2, left_px)[chosen]
-    return float(squares.sum() / max(2 * chosen.sum() - 4, 1))
-
-
-def _root_px(covariance: Float[np.ndarray, "4 4"], size_px: tuple[int, int]) -> Float[np.ndarray, "4 4"]:
-    """Motions of one standard deviation, in px at the picture's edge; without bound where nothing is known."""
-    to_edge = np.array([1.0, 1.0, max(size_px) / 2, max(size_px) / 2])
-    values, vectors = np.linalg.eigh(covariance * np.outer(to_edge, to_edge))
-    if values[0] <= 1e-12 * values[-1]:
-        return np.full((4, 4), np.inf)
-    return vectors * np.sqrt(values)
-
-
-def _told(drift: Similarity) -> str:
+def _told(drift: Similarity, source: str) -> str:
     return (
-        f"Drift between the exposures, from the border: {drift.column_px:+.4f} px across, "
+        f"Drift between the exposures, from {source}: {drift.column_px:+.4f} px across, "
         f"{drift.row_px:+.4f} px down, {1e6 * drift.rotation_rad:+.1f} urad; removed."
     )
 

@@ -11,16 +11,17 @@ from app.errors import BadInputError
 from app.experiment.captures import Capture, CapturePair
 from app.experiment.found import Found
 from app.reconstruct.bursts import burst_shifts, windows_among
-from app.reconstruct.drift import Agreement, Exposures, agreement, mount, without_known_drift
+from app.reconstruct.drift import Agreement, agreement, mount, without_known_drift
 from app.reconstruct.found import what_stands
 from app.reconstruct.pair import check_pair
 from app.reconstruct.short_mean import with_short_mean
 from app.reconstruct.unstated import past_objects
+from app.reconstruct.yardstick import Exposures, Yardstick
 from core.camera_noise import frame_variance, scattered_variance
 from core.displacement import resolve_window_px, window_centres
 from core.drift import Similarity, move_image
 from core.problem import ImagePair, ShiftMeasurement
-from core.rays.visibility import hidden_by_objects, sees_wall
+from core.rays.visibility import hidden_by_objects, sees_wall, within_marks
 from core.scene import Scene, View
 from core.watch import Watch
 from core.window_fit import derivative_filter
@@ -102,12 +103,15 @@ def _measure_view(
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     exposures = _exposures(scene, index, captures.reference, captures.flow)
     check_pair(captures.reference, captures.flow, index, exposures.variance)
-    in_room, beyond = _wall_and_beyond(scene, index, exposures.before.shape, exposures.window_px)
+    shape, window_px = exposures.before.shape, exposures.window_px
+    in_room, beyond = _wall_and_beyond(scene, index, shape, window_px)
     prior, said = mount(view.drift_std_px), ""
     if captures.after is not None:
         found = between_references(captures, scene, index)
         prior, said = found.at(_share(captures.reference, captures.flow, captures.after)), f"{found.said} "
-    shift, drift, note = without_known_drift(exposures, in_room, beyond, prior)
+    shift, drift, note = without_known_drift(
+        exposures, in_room, beyond, prior, _marks(view, shape, window_px)
+    )
     return _in_room(shift, in_room, covered, drift, said + note)
 
 
@@ -120,7 +124,18 @@ def _wall_and_beyond(scene: Scene, index: int, shape: tuple[int, int], window_px
     reach_px = 0.5 * window_px + len(derivative_filter()) // 2
     beyond = ~sees_wall(scene, index, centres, margin_px=-reach_px)
     beyond &= ~hidden_by_objects(scene, index, centres, margin_px=float(window_px))
+    for marks in scene.views[index].marks:
+        beyond &= ~within_marks(marks, centres, -float(window_px))
     return in_room, beyond & _whole(centres, shape)
+
+
+def _marks(view: View, shape: tuple[int, int], window_px: int) -> list[Yardstick]:
+    """The windows that lie wholly in each of a view's marks."""
+    centres = window_centres(shape, window_px)
+    whole, reach_px = _whole(centres, shape), 0.5 * window_px + len(derivative_filter()) // 2
+    return [
+        Yardstick(f"marks {one.name!r}", whole & within_marks(one, centres, reach_px)) for one in view.marks
+    ]
 
 
 def _alone(scene: Scene, index: int, mean: Image, window_px: int) -> Callable[[Capture], ShiftMeasurement]:
@@ -130,11 +145,12 @@ def _alone(scene: Scene, index: int, mean: Image, window_px: int) -> Callable[[C
     """
     view = scene.views[index]
     in_room, beyond = _wall_and_beyond(scene, index, mean.shape, window_px)
+    marks = _marks(view, mean.shape, window_px)
 
     def measured(burst: Capture) -> ShiftMeasurement:
         variance = uniform_filter(_variance(burst, index, view), 2 * window_px)
         exposures = Exposures(mean, burst.images[index].mean, variance, window_px)
-        return without_known_drift(exposures, in_room, beyond, mount(view.drift_std_px))[0]
+        return without_known_drift(exposures, in_room, beyond, mount(view.drift_std_px), marks)[0]
 
     return measured
 

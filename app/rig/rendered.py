@@ -11,20 +11,18 @@ from jaxtyping import Float, Float32
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
 from app.experiment.rig_settings import SimulatedCameraSettings
+from app.rig.beyond_wall import in_frame, in_room, with_marks
 from app.rig.nuisances import spoiled
 from app.volume.file import RoomVolume, read_volume
 from app.volume.scene import room_box, room_objects
 from app.volume.snapshots import read_snapshots
 from core.fields import GridField
-from core.geometry import Box, crop, rotation_matrix, rotation_vector
-from core.plan.print_choice import suited_print
+from core.geometry import Box, rotation_matrix, rotation_vector
 from core.rays.visibility import first_hit, wall_points
 from core.render import render_flow, render_reference
 from core.scene import ProjectedPattern, Scene
-from core.view_frame import facing
+from core.view_frame import facing, field_facing, turn_of
 
-# The print around a simulated room: as fine as the pattern, but another one.
-FRAME_SEED = 1_000_003
 # Seeds of one view after those of another: each camera has noise and a mount of its own.
 VIEWS_APART = 7919
 
@@ -43,7 +41,7 @@ def seen_picture(
     scene = _mounted(experiment, settings, view, steps)
     volume = read_volume(experiment.file(settings.room))
     field = None if air == "still" else volume_field(volume, scene)
-    picture = _rendered(volume, settings, scene, field, view)
+    picture = _rendered(volume, experiment, settings, scene, field, view)
     return spoiled(picture, settings.world, steps, settings.seed + VIEWS_APART * view)
 
 
@@ -63,7 +61,7 @@ def moving_pictures(
     @lru_cache(maxsize=2)
     def picture(index: int) -> Picture:
         field = temperature_field(snapshots.temperature_k[index], scene)
-        drawn = _rendered(volume, settings, scene, field, view)
+        drawn = _rendered(volume, experiment, settings, scene, field, view)
         return spoiled(drawn, settings.world, steps, settings.seed + VIEWS_APART * view)
 
     return lambda time_s: picture(snapshots.nearest(time_s))
@@ -93,6 +91,7 @@ def _as_it_is(experiment: Experiment, settings: SimulatedCameraSettings) -> Scen
 
 def _rendered(
     volume: RoomVolume,
+    experiment: Experiment,
     settings: SimulatedCameraSettings,
     scene: Scene,
     field: GridField | None,
@@ -101,9 +100,15 @@ def _rendered(
     """The room through this air, or through still air; with its frame and its objects."""
     image = render_reference(scene, view) if field is None else render_flow(scene, field, view)
     # What stands in the room, whether or not the scene states it.
+    stated, turned = view, None if field is None else field_facing(field, turn_of(scene, view))
     scene, view = facing(replace(scene, objects=room_objects(volume)), view)
-    framed = _framed(image, scene, view) if settings.border == "print" else image
-    return with_objects(framed, scene, view)
+    # Prints keep their size when the lens breathes.
+    focal_px = experiment.settings.scene.views[stated].camera.focal_px[0]
+    if settings.border == "print":
+        image = in_frame(image, scene, view, focal_px)
+    elif settings.border == "room":
+        image = in_room(image, scene, view, focal_px, turned)
+    return with_marks(with_objects(image, scene, view), scene, view, focal_px, settings.world.marks_blur_px)
 
 
 def with_objects(image: Picture, scene: Scene, view: int) -> Picture:
@@ -133,41 +138,6 @@ def _draw_objects(block: Picture1, pixels: Float[np.ndarray, "pixels 2"], scene:
         waves = np.sin(2 * np.pi * at_m / _FOLDS_M)
         block[seen] = np.clip(0.4 + 0.15 * waves.prod(axis=1), 0.02, 0.9)
         nearest[seen] = met[seen]
-
-
-def _framed(image: Picture, scene: Scene, view: int) -> Picture:
-    """The picture in a printed frame: what lies beyond the wall is still, and shows the camera's drift."""
-    beyond = image == 0
-    room, reach_m = scene.room, 0.1 * max(scene.room.size_m)
-    (x0, y0, z0), (x1, y1, z1) = room.lower_m, room.upper_m
-    wide = Box(lower_m=(x0 - reach_m, y0, z0 - reach_m), upper_m=(x1 + reach_m, y1, z1 + reach_m))
-    camera = scene.views[view].camera
-    print_ = suited_print(camera, y1 - camera.position_m[1], FRAME_SEED)
-    frame_scene = replace(scene, room=wide, light=print_)
-    framed = image.copy()
-    for strip in _strips_around(~beyond):
-        part = replace(scene.views[view], camera=crop(camera, *strip))
-        views = tuple(part if i == view else v for i, v in enumerate(scene.views))
-        drawn = render_reference(replace(frame_scene, views=views), view)
-        framed[strip] = np.where(beyond[strip], drawn, image[strip])
-    return framed
-
-
-def _strips_around(inside: np.ndarray) -> list[tuple[slice, slice]]:
-    """The four strips (rows, columns) around the bounding box of what is inside."""
-    rows, cols = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
-    if not len(rows):
-        return [(slice(0, inside.shape[0]), slice(0, inside.shape[1]))]
-    # One pixel more, for a box that is not quite upright in the picture.
-    top, bottom = int(rows[0]) + 2, int(rows[-1]) - 1
-    left, right = int(cols[0]) + 2, int(cols[-1]) - 1
-    strips = [
-        (slice(0, top), slice(0, inside.shape[1])),
-        (slice(bottom, inside.shape[0]), slice(0, inside.shape[1])),
-        (slice(top, bottom), slice(0, left)),
-        (slice(top, bottom), slice(right, inside.shape[1])),
-    ]
-    return [(r, c) for r, c in strips if r.stop > r.start and c.stop > c.start]
 
 
 def volume_field(volume: RoomVolume, scene: Scene) -> GridField:

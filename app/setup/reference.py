@@ -42,6 +42,10 @@ marker_m = 0.0225
 [[scene.views]]
 f_number = 8.0
 focal_m = 0.025
+[[scene.views.marks]]
+name = "left board"
+lower_px = [0.0, 0.0]
+upper_px = [320.0, 180.0]
 [scene.light]
 kind = "projector"
 [scene.light.projector]

@@ -8,20 +8,29 @@ from pathlib import Path
 from typing import Literal
 
 from app.capture.burst import BurstWatch, take
+from app.capture.series import PLACES
 from app.errors import AirlensError, BadInputError
-from app.experiment.folder import TRUTH_FILE, ExperimentSettings, create_experiment
+from app.experiment.folder import (
+    TRUTH_FILE,
+    Experiment,
+    ExperimentSettings,
+    create_experiment,
+    open_experiment,
+)
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.files.durable import durable_folder, write_durably, write_text
-from app.rig.open import air_of, open_camera
+from app.rig.open import air_of, named_camera, open_camera
 from app.volume.file import RoomVolume, read_volume
 from app.volume.misread import misread
 from app.volume.scene import Information, RigOptions, room_box, room_scene, write_plane
 from app.volume.snapshots import read_snapshots
 from calibration.bundle import given_bundle, to_json
 from core.scene import PlaneField, ProjectedPattern, Scene
-from drivers.burst import CapturePlan, CaptureRole, Progress
+from drivers.burst import CapturePlan, Progress
 
 SNAPSHOTS_FILE = "snapshots.npz"
+# Between the bursts of a series.
+_APART_S = 60.0
 
 OnStage = Callable[[str, int, int], object]
 
@@ -35,12 +44,14 @@ def simulate(
     on_stage: OnStage = lambda stage, done, total: None,
     *,
     misreads: bool = False,
+    bracketed: bool = False,
     cells: int | Literal["auto"] = "auto",
     snapshots_path: Path | None = None,
 ) -> Path:
     """Make an experiment folder from a volume: scene, calibration, reference and flow captures.
 
-    With `misreads` what is known of the boundary is as wrong as its deviations say, by the camera's seed.
+    With `misreads` what is known of the boundary is as wrong as its deviations say, by the camera's seed. With
+    `bracketed` a second reference follows the flow, as a series.
     `cells` is the solver's grid, as the scene states it. With snapshots each frame of a flow capture sees the air
     of its moment.
     The whole folder appears at once, when it is complete. The truth is copied into it for the simulated
@@ -58,7 +69,8 @@ def simulate(
         files[SNAPSHOTS_FILE] = snapshots_path
         camera = camera.model_copy(update={"snapshots": SNAPSHOTS_FILE})
     with durable_folder(folder) as unfinished:
-        _fill(unfinished, files, volume, scene, information, camera, on_stage)
+        _fill(unfinished, files, volume, scene, information, camera)
+        _capture(open_experiment(unfinished), bracketed, on_stage)
     return folder
 
 
@@ -69,7 +81,6 @@ def _fill(
     scene: Scene,
     information: Information,
     camera: SimulatedCameraSettings,
-    on_stage: OnStage,
 ) -> None:
     settings = ExperimentSettings(
         title=str(volume.case.get("title", files[TRUTH_FILE].stem)),
@@ -83,16 +94,23 @@ def _fill(
     if any(isinstance(known, PlaneField) for known in scene.boundary):
         write_plane(folder, volume)
     write_text(experiment.bundle_path, to_json(_bundle(scene)))
-    roles: tuple[CaptureRole, ...] = ("reference", "flow")
-    for role in roles:
-        plan = CapturePlan(role=role, frames=1 if camera.noise_free else scene.views[0].frames)
+
+
+def _capture(experiment: Experiment, bracketed: bool, on_stage: OnStage) -> None:
+    """Reference and flow; between two references, a minute apart, where it is bracketed."""
+    settings = named_camera(experiment)
+    noise_free = isinstance(settings, SimulatedCameraSettings) and settings.noise_free
+    frames = 1 if noise_free else experiment.settings.scene.views[0].frames
+    for place, role in enumerate(PLACES if bracketed else PLACES[:2]):
+        plan = CapturePlan(role=role, frames=frames)
+        series = {"id": "simulated", "place": place, "began_s": _APART_S * place} if bracketed else None
 
         def progress(p: Progress, role: str = role) -> None:
             on_stage(role, p.done, p.total)
 
         on_stage(role, 0, plan.frames)
-        with open_camera(experiment, air_of(role)) as opened:
-            taken = take(opened, experiment, plan, watch=BurstWatch(progress))
+        with open_camera(experiment, air_of(role), moment=place) as opened:
+            taken = take(opened, experiment, plan, watch=BurstWatch(progress), series=series, moment=place)
         if taken.shortfall:
             raise AirlensError(taken.shortfall)
 

@@ -10,7 +10,7 @@ from app.errors import BadInputError
 from app.experiment.rig_settings import SimulatedCameraSettings, World
 from app.volume.scene import RigName
 
-Border = Literal["print", "bare"]
+Border = Literal["print", "bare", "room"]
 WorldName = Literal["ideal", "lab"]
 
 
@@ -18,13 +18,16 @@ WorldName = Literal["ideal", "lab"]
 class RigWorld:
     """What spoils the pictures, the mount's step between bursts, the border, whether entries are misread.
 
-    `place` is where its rig stands unless somebody says otherwise.
+    What may tell the mount's step: `marks` near the camera, and a second reference (`bracketed`). `place` is where
+    its rig stands unless somebody says otherwise.
     """
 
     world: World = field(default_factory=World)
     drift_px: float = 0.0
     border: Border = "print"
     misreads: bool = False
+    marks: bool = False
+    bracketed: bool = False
     place: RigName = "paper"
 
     def camera(self, seed: int, noise_free: bool = False) -> SimulatedCameraSettings:
@@ -46,6 +49,7 @@ LAB = RigWorld(
         ripple=0.01,
         flicker=0.003,
         hot_pixels=1e-5,
+        marks_blur_px=2.0,
         covered=0.05,
     ),
     drift_px=0.3,
@@ -90,7 +94,7 @@ def changed(
 
 
 def one_by_one(world: RigWorld) -> dict[str, RigWorld]:
-    """Nothing, each nuisance of `world` alone, and all of them with a still border and as they are."""
+    """Nothing, each nuisance of `world` alone, and all of them: as they are, and with what may tell the drift."""
     nothing = RigWorld()
     default = nothing.world.model_dump()
     spoiling = {name: value for name, value in world.world.model_dump().items() if value != default[name]}
@@ -101,5 +105,7 @@ def one_by_one(world: RigWorld) -> dict[str, RigWorld]:
         "drift, nothing still": replace(nothing, drift_px=world.drift_px, border="bare"),
         "entries misread": replace(nothing, misreads=True),
         "all, still border": replace(world, border="print"),
+        "all, marks": replace(world, marks=True),
+        "all, bracketed": replace(world, bracketed=True),
         "all": world,
     }

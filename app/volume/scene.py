@@ -21,6 +21,7 @@ from core.scene import (
     Heater,
     Inlet,
     Light,
+    Marks,
     Outlet,
     Patch,
     PlaneField,
@@ -39,6 +40,8 @@ RigName = Literal["paper", "lab"]
 BORDER = 0.03
 # Two windows, and the gradient's reach at the picture's edge.
 BORDER_PX = 36
+# A board near the camera: its share of the picture's width and height.
+_BOARD = (0.16, 0.12)
 PLANE_FILE = "boundary/plane_x_min.npz"
 
 _WALLS: dict[str, WallName] = {
@@ -60,7 +63,8 @@ class RigOptions:
     """The rig to simulate. Lengths in metres; `baseline_m` is projector minus camera (x, z).
 
     The picture reaches `border_px` beyond the wall at least, which windows need and single pixels do not. `walls` are
-    patterned, each with a camera before it, and with a print or projector of its own.
+    patterned, each with a camera before it, and with a print or projector of its own. With `marks`, two still boards
+    near each camera stand in the upper corners of its picture.
     """
 
     camera_px: tuple[int, int] = (4096, 3072)
@@ -73,6 +77,7 @@ class RigOptions:
     pattern_seed: int = 0
     border_px: int = BORDER_PX
     walls: tuple[WallName, ...] = ("y_max",)
+    marks: bool = False
 
     def __post_init__(self) -> None:
         if self.frames < 1 or self.full_well_e <= 0 or min(self.camera_px) < 16:
@@ -127,6 +132,16 @@ def _view(room: Box, options: RigOptions, number: int) -> View:
         light=light,
         noise=CameraNoise(full_well_e=options.full_well_e),
         frames=options.frames,
+        marks=_boards(options.camera_px) if options.marks else (),
+    )
+
+
+def _boards(size_px: tuple[int, int]) -> tuple[Marks, ...]:
+    width, height = (share * length for share, length in zip(_BOARD, size_px, strict=True))
+    last = size_px[0] - 1.0
+    return (
+        Marks(name="left board", lower_px=(0.0, 0.0), upper_px=(width, height)),
+        Marks(name="right board", lower_px=(last - width, 0.0), upper_px=(last, height)),
     )
 
 

@@ -47,7 +47,7 @@ def shift_noise(scene: Scene, view: int, window_px: int) -> ShiftNoise:
     eye = scene.views[view]
     deviations, levels, contrasts, slopes = [], [], [], []
     for centre in ((0.5, 0.5), (0.2, 0.2), (0.8, 0.2), (0.2, 0.8), (0.8, 0.8)):
-        cropped = replace(eye, camera=_crop(eye.camera, centre, _WINDOWS_A_CROP * window_px))
+        cropped = replace(eye, camera=_crop(eye.camera, centre, _WINDOWS_A_CROP * window_px), marks=())
         views = tuple(cropped if i == view else v for i, v in enumerate(scene.views))
         image = np.clip(render_reference(replace(scene, views=views), view), 0.0, 1.0)
         if image.std() == 0.0 or min(image.shape) < window_px:

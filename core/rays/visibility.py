@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 
 from core.objects import RoomObject
 from core.rays.optics import pinhole
-from core.scene import ProjectedPattern, Scene
+from core.scene import Marks, ProjectedPattern, Scene
 from core.view_frame import facing, turn_of
 
 # Air so near to an object is in a layer that a room's grid does not resolve: rays through it are left out.
@@ -19,15 +19,28 @@ def sees_wall(
 ) -> Bool[np.ndarray, " points"]:
     """Whether pixels (column, row) see the back wall at least `margin_px` inside its edges.
 
-    A negative margin asks for the wall and a strip around it. Else what an object hides is not seen, and no ray
-    passes an object by less than the margin.
+    A negative margin asks for the wall and a strip around it. Else what an object or marks hide is not seen, and no
+    ray passes an object by less than the margin.
     """
     scene, view = facing(scene, view)
     point, range_m = _on_the_wall(scene, view, pixels)
     inside = _inside(
         scene, point, margin_px * range_m / min(scene.views[view].camera.focal_px) * np.ones((2, 1))
     )
-    return inside if margin_px < 0 else inside & ~hidden_by_objects(scene, view, pixels, margin_px)
+    if margin_px < 0:
+        return inside
+    shown = inside & ~hidden_by_objects(scene, view, pixels, margin_px)
+    for marks in scene.views[view].marks:
+        shown &= ~within_marks(marks, pixels, -margin_px)
+    return shown
+
+
+def within_marks(
+    marks: Marks, pixels: Float[np.ndarray, "points 2"], margin_px: float
+) -> Bool[np.ndarray, " points"]:
+    """Whether pixels (column, row) lie in the marks' rectangle, so far inside its edges; below 0: around it."""
+    low, high = np.array(marks.lower_px) + margin_px, np.array(marks.upper_px) - margin_px
+    return np.all((pixels >= low) & (pixels <= high), axis=1)
 
 
 def hidden_by_objects(

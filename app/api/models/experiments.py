@@ -1,6 +1,6 @@
 """Experiments, and what may be changed of them."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -68,9 +68,22 @@ class NewExperiment(WireModel):
     world: Literal["ideal", "lab"] = "lab"
 
 
+# Column and row, in a request.
+Corner = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class MarksModel(WireModel):
+    """A region of the first view's picture in which a still board or marks near the camera stand: its two corners."""
+
+    name: str = Field(min_length=1, max_length=200)
+    lower_px: Corner
+    upper_px: Corner
+
+
 class ExperimentChange(WireModel):
-    """What people wrote about it, and the board that its rig is calibrated with."""
+    """What people wrote about it, the board that its rig is calibrated with, and the marks in its first picture."""
 
     title: str | None = Field(default=None, max_length=200)
     information: str | None = Field(default=None, max_length=10_000)
     board: BoardGeometry | None = None
+    marks: list[MarksModel] | None = Field(default=None, max_length=50)

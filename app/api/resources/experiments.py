@@ -1,6 +1,7 @@
 """Experiments: one folder each; the rig, the scene, and counts of what was taken and computed."""
 
 import contextlib
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from app.api.models.experiments import (
     ExperimentChange,
     ExperimentLine,
     ExperimentResource,
+    MarksModel,
     NewExperiment,
     NextResource,
 )
@@ -28,7 +30,7 @@ from app.files.reading import reading
 from app.files.toml import to_plain
 from app.simulate.rehearsal import Rehearsal, rehearse
 from app.whereabouts import next_step
-from core.scene import ProjectedPattern
+from core.scene import Marks, ProjectedPattern, Scene
 
 router = APIRouter(tags=["experiments"])
 
@@ -63,14 +65,16 @@ def change_experiment(
     response: Response,
     if_match: IfMatch = None,
 ) -> ExperimentResource:
-    """Change title, notes, or the board to calibrate with; what is left out stays as somebody else left it."""
-    words = change.model_dump(exclude_none=True, exclude={"board"})
+    """Change title, notes, the board to calibrate with, or the marks; what is left out stays as somebody left it."""
+    words = change.model_dump(exclude_none=True, exclude={"board", "marks"})
     board = None if change.board is None else board_settings(change.board)
     with given.folders.locked(experiment):
         found = given.folders.open(experiment)
         check_revision(if_match, _changeable(found), change.model_dump(exclude_none=True))
         if board is not None:
             words["rig"] = found.settings.rig.model_copy(update={"board": board})
+        if change.marks is not None:
+            words["scene"] = _marked(found.settings.scene, change.marks)
         saved = save_settings(found.folder, found.settings.model_copy(update=words))
     return experiment_resource(saved, response)
 
@@ -80,7 +84,19 @@ def _changeable(experiment: Experiment) -> dict[str, Any]:
     settings = experiment.settings
     board = None if settings.rig.board is None else settings.rig.board.model_dump()
     words = {"title": settings.title, "information": settings.information}
-    return {"revision": experiment.revision, **words, "board": board}
+    marks = [asdict(one) for one in settings.scene.views[0].marks]
+    return {"revision": experiment.revision, **words, "board": board, "marks": marks}
+
+
+def _marked(scene: Scene, marks: list[MarksModel]) -> Scene:
+    """The scene with these marks in its first view. Raises SettingError."""
+    first, *others = scene.views
+    corners = [[(float(column), float(row)) for column, row in (one.lower_px, one.upper_px)] for one in marks]
+    drawn = tuple(
+        Marks(name=one.name, lower_px=low, upper_px=high)
+        for one, (low, high) in zip(marks, corners, strict=True)
+    )
+    return replace(scene, views=(replace(first, marks=drawn), *others))
 
 
 def _line_or_reason(given: Services, folder: Path) -> ExperimentLine:

@@ -32,6 +32,22 @@ def test_who_changes_what_somebody_else_changed_is_told_both_versions(live: Live
         assert client.patch(path, json={"information": "dry"}).json()["title"] == "His"
 
 
+def test_marks_are_drawn_in_the_picture_and_stay_when_something_else_changes(live: Live):
+    with live.client() as client:
+        made = client.post("/api/experiments", json={"kind": "simulated", "camera_px": 64})
+        path = f"/api/experiments/{made.json()['experiment']}"
+        drawn = {"name": "board", "lower_px": [0, 0.5], "upper_px": [20, 15]}
+        done = client.patch(path, json={"marks": [drawn]})
+        assert done.status_code == 200
+        assert done.headers["etag"] != made.headers["etag"]
+        kept = client.patch(path, json={"title": "Marked"}).json()["settings"]["scene"]["views"][0]["marks"]
+        assert kept == [{"name": "board", "lower_px": [0.0, 0.5], "upper_px": [20.0, 15.0]}]
+        outside = client.patch(path, json={"marks": [drawn | {"upper_px": [200, 15]}]})
+        assert is_problem(outside, "bad_input")
+        assert "Draw them within it" in outside.json()["detail"]
+        assert client.patch(path, json={"marks": []}).json()["settings"]["scene"]["views"][0]["marks"] == []
+
+
 def test_experiments_that_are_made_at_once_all_appear_whole(live: Live):
     answers = []
 

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy import ndimage
 
-from app.reconstruct.drift import Exposures, agreement, mount, without_known_drift
+from app.reconstruct.drift import agreement, mount, without_known_drift
+from app.reconstruct.yardstick import Exposures
 from core.displacement import window_centres
 from core.motion import edge_basis
 from tests.core.test_displacement import band_limited

@@ -1,12 +1,19 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
-from app.rig.rendered import with_objects
+from app.experiment.folder import open_experiment
+from app.experiment.rig_settings import SimulatedCameraSettings
+from app.rig.beyond_wall import with_marks
+from app.rig.rendered import seen_picture, with_objects
+from app.simulate.experiment import simulate
+from app.volume.scene import RigOptions
 from core.geometry import Box, looking_along_y
 from core.objects import RoomObject
 from core.rays.visibility import hidden_by_objects
-from core.scene import FixedTexture, Scene, View
+from core.scene import FixedTexture, Marks, Scene, View
+from tests.rooms import ROOM as VOLUME
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(4.0, 3.0, 3.0))
 CAMERA = looking_along_y(position_m=(2.0, -7.0, 1.5), width_px=84, height_px=64, focal_px=200.0)
@@ -24,3 +31,36 @@ def test_a_picture_shows_objects_exactly_where_they_hide_the_wall():
     assert np.array_equal(seen != wall, hidden)
     assert 0.02 <= seen[hidden].min() < seen[hidden].max() <= 0.9
     assert with_objects(wall, replace(SCENE, objects=()), 0) is wall
+
+
+def test_a_board_is_drawn_wherever_the_view_has_marks_and_is_out_of_focus():
+    wall = np.full((64, 84), 0.99, np.float32)
+    marks = Marks(name="board", lower_px=(20.0, 20.0), upper_px=(60.0, 44.0))
+    marked = replace(SCENE, views=(View(camera=CAMERA, marks=(marks,)),), objects=())
+    sharp, soft = (with_marks(wall, marked, 0, 200.0, blur_px) for blur_px in (0.0, 8.0))
+    rows, columns = np.nonzero(sharp != wall)
+    assert (columns.min(), columns.max(), rows.min(), rows.max()) == (12, 68, 12, 52)
+    inner = np.s_[24:40, 24:56]
+    assert sharp[inner].std() > 0.02
+    assert np.abs(np.diff(soft[inner])).mean() < 0.5 * np.abs(np.diff(sharp[inner])).mean()
+    assert with_marks(wall, SCENE, 0, 200.0, 1.0) is not None
+    np.testing.assert_array_equal(with_marks(wall, SCENE, 0, 200.0, 1.0), wall)
+
+
+def test_beyond_the_wall_the_rooms_other_walls_move_with_the_air_and_a_frame_does_not(tmp_path):
+    camera, moved = SimulatedCameraSettings(noise_free=True), {}
+    options = RigOptions(camera_px=(160, 120), frames=1, stand_off_m=4.0)
+    experiment = open_experiment(simulate(VOLUME, tmp_path / "e", options, "operator", camera))
+    wall = seen_picture(experiment, camera.model_copy(update={"border": "bare"}), "still", 0, 0) > 0
+    beside = np.asarray(binary_dilation(wall, iterations=6), bool) & ~np.asarray(binary_dilation(wall), bool)
+    for border in ("bare", "print", "room"):
+        shown = camera.model_copy(update={"border": border})
+        still, flow = (seen_picture(experiment, shown, air, 0, 0) for air in ("still", "moving"))
+        change = np.abs(flow - still)
+        moved[border] = float(still[beside].std()), float(change[beside].mean()), float(change[wall].mean())
+    assert moved["bare"][:2] == (0.0, 0.0)
+    assert moved["print"][0] > 0.03
+    assert moved["print"][1] == 0.0
+    # What is seen of the side walls lies near the back wall, behind nearly as much air; its print is coarser.
+    assert moved["room"][0] > 0.03
+    assert moved["room"][1] > 0.05 * moved["room"][2] > 0.0

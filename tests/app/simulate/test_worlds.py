@@ -28,13 +28,15 @@ from tests.app.capture.test_series import ROOM
 def test_one_nuisance_at_a_time_and_then_all():
     worlds = one_by_one(LAB)
     names = [name for name in LAB.world.model_fields_set if name in worlds]
-    assert len(names) == 9
+    assert len(names) == 10
     for name in names:
         spoiling = worlds[name].world.model_dump()
         assert spoiling[name] == getattr(LAB.world, name)
         assert sum(value != worlds["nothing"].world.model_dump()[key] for key, value in spoiling.items()) == 1
     assert worlds["all"] == LAB
     assert worlds["all, still border"].border == "print"
+    assert worlds["all, marks"].marks
+    assert worlds["all, bracketed"].bracketed
     assert worlds["entries misread"].misreads
 
 
