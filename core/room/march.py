@@ -9,6 +9,7 @@ Courant number, once.
 Between two chunks of steps a march can be stopped; it goes on from its last window (`MarchState`).
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,7 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from core.result import Outcome
 from core.room.level import level_correction
@@ -166,35 +167,48 @@ def _window(
 ) -> tuple[Flow, Flow, int]:
     """Mean over one window, the state at its end, and the steps taken; `courants`: number, and its first share."""
     courant, share = courants
-    left_s, means, weights = settings.window_s, [], []
+    left_s, means, weights, taken = settings.window_s, [], [], 0
     while left_s > 1e-9:
         check_stop()
         stable_s = float(_longest_step_s(flow, model, courant))
         if not stable_s > 1e-9:
             break
-        dt_s = min(share * stable_s, left_s / (2 * settings.chunk_steps))
+        # Air at rest allows any step; the first ones are short, since it does not stay at rest.
+        longest_s = min(share * stable_s, settings.window_s / (2 * settings.chunk_steps))
+        pairs, dt_s = chunk_pairs(left_s, longest_s, settings.chunk_steps)
         share = 1.0
-        flow, mean = advance_chunk(flow, model, jnp.float32(dt_s), settings.chunk_steps)
+        flow, mean = advance_chunk(flow, model, jnp.float32(dt_s), jnp.int32(pairs))
         means.append(mean)
-        weights.append(dt_s)
-        left_s -= 2 * settings.chunk_steps * dt_s
+        weights.append(pairs * dt_s)
+        taken += 2 * pairs
+        left_s -= 2 * pairs * dt_s
     if not means:
         return flow, eqx.tree_at(lambda f: f.excess_k, flow, flow.excess_k * jnp.nan), 0
-    return _mean(means, weights), flow, 2 * settings.chunk_steps * len(means)
+    return _mean(means, weights), flow, taken
+
+
+def chunk_pairs(left_s: float, stable_s: float, most: int) -> tuple[int, float]:
+    """Pairs of steps of the next chunk, at most `most`, and the step [s]: what is left, in equal stable steps."""
+    pairs = max(1, math.ceil(left_s / (2 * stable_s) - 1e-6))
+    chunks = math.ceil(pairs / most)
+    in_chunk = math.ceil(pairs / chunks)
+    return in_chunk, left_s / (2 * chunks * in_chunk)
 
 
 @eqx.filter_jit
-def advance_chunk(flow: Flow, model: RoomModel, dt_s: Float[Array, ""], pairs: int) -> tuple[Flow, Flow]:
-    """The flow after `pairs` pairs of steps, and its mean over them."""
+def advance_chunk(
+    flow: Flow, model: RoomModel, dt_s: Float[Array, ""], pairs: Int[Array, ""]
+) -> tuple[Flow, Flow]:
+    """The flow after `pairs` pairs of steps, and its mean over them; one program for any number of them."""
 
-    def body(carry: tuple[Flow, Flow], _: None) -> tuple[tuple[Flow, Flow], None]:
+    def body(_: Int[Array, ""], carry: tuple[Flow, Flow]) -> tuple[Flow, Flow]:
         flow, total = carry
         flow = two_steps(flow, model, dt_s)
-        return (flow, jax.tree.map(jnp.add, total, flow)), None
+        return flow, jax.tree.map(jnp.add, total, flow)
 
-    zero = jax.tree.map(jnp.zeros_like, flow)
-    (flow, total), _ = lax.scan(body, (flow, zero), length=pairs)
-    return _filled(flow, model), _filled(jax.tree.map(lambda leaf: leaf / pairs, total), model)
+    flow, total = lax.fori_loop(0, pairs, body, (flow, jax.tree.map(jnp.zeros_like, flow)))
+    count = pairs.astype(jnp.float32)
+    return _filled(flow, model), _filled(jax.tree.map(lambda leaf: leaf / count, total), model)
 
 
 def _filled(flow: Flow, model: RoomModel) -> Flow:

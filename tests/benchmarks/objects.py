@@ -161,11 +161,11 @@ def cost(cells: int, pairs: int = 5, rounds: int = 6) -> dict[str, float | str]:
         where = room(_scene(size_m, openings, *things), cells, "k_epsilon")
         models.append(where.model(_parameters(where, 75.0)))
         flow = where.at_rest(models[-1], np.zeros(where.grid.cells[2]))
-        flows.append(advance_chunk(flow, models[-1], jnp.float32(0.02), pairs)[0])
+        flows.append(advance_chunk(flow, models[-1], jnp.float32(0.02), jnp.int32(pairs))[0])
     for _ in range(rounds):
         for which, (flow, model) in enumerate(zip(flows, models, strict=True)):
             began = time.perf_counter()
-            jax.block_until_ready(advance_chunk(flow, model, jnp.float32(0.02), pairs))
+            jax.block_until_ready(advance_chunk(flow, model, jnp.float32(0.02), jnp.int32(pairs)))
             least_s[which] = min(least_s[which], (time.perf_counter() - began) / pairs)
     return {
         "part": "cost", "cells": cells, "empty_s": least_s[0], "objects_s": least_s[1],

@@ -130,7 +130,9 @@ def test_a_room_with_jet_outlet_and_heater_marches_without_divergence():
         buoyancy_m_s2_k=9.81 / 293.15,
         molecular_m2_s=1.5e-5,
     )
-    flow, mean = advance_chunk(air_at_rest(model, jnp.zeros(grid.cells), 0.5), model, jnp.float32(0.05), 20)
+    flow, mean = advance_chunk(
+        air_at_rest(model, jnp.zeros(grid.cells), 0.5), model, jnp.float32(0.05), jnp.int32(20)
+    )
 
     assert float(jnp.abs(divergence_per_s(flow.velocity, grid)).max()) < 1e-4
     assert float(flow.turbulence.energy_m2_s2.min()) > 0

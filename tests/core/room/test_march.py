@@ -5,7 +5,7 @@ import pytest
 
 from core.result import Outcome
 from core.room.closure import ConstantClosure
-from core.room.march import MarchSettings, march
+from core.room.march import MarchSettings, chunk_pairs, march
 from core.room.room_grid import RoomGrid
 from core.room.step import RoomModel, air_at_rest, longest_step_s, room_model
 from core.room.wall_planes import Boundary, WallPlane, closed_room
@@ -86,6 +86,31 @@ def test_lid_driven_cavity_has_the_published_centre_line():
     assert found == pytest.approx(np.array(published), abs=0.02)
 
 
+@pytest.mark.parametrize(("left_s", "stable_s"), [(5.0, 0.031), (5.0, 0.125), (5.0, 9.0), (0.4, 0.3)])
+def test_what_is_left_of_a_window_is_divided_in_equal_stable_steps(left_s: float, stable_s: float):
+    whole_s, steps = left_s, []
+    while left_s > 1e-9:
+        pairs, dt_s = chunk_pairs(left_s, stable_s, 20)
+        assert 1 <= pairs <= 20
+        steps += [dt_s] * 2 * pairs
+        left_s -= 2 * pairs * dt_s
+
+    assert sum(steps) == pytest.approx(whole_s, rel=1e-9)
+    assert max(steps) <= stable_s * (1 + 1e-5)
+    # No more than whole pairs, and equal chunks, ask for.
+    assert len(steps) <= whole_s / stable_s + 2 * (1 + whole_s / (40 * stable_s))
+
+
+def test_the_step_keeps_positive_weights_where_air_hardly_moves():
+    model = flat_room(8, 1e-2, (as_it_is, as_it_is), (as_it_is, as_it_is), 0.0)
+    still = air_at_rest(model, jnp.zeros(model.grid.cells), 0.0)
+    viscosity = model.viscosity(still)
+    diffusive = max(float(viscosity.cells_m2_s.max()), float(model.diffusivity_m2_s(viscosity).max()))
+
+    own = 2.0 * float(longest_step_s(still, model, 0.45)) * diffusive
+    assert own * sum(1.0 / h**2 for h in model.grid.spacing_m) == pytest.approx(1.0, rel=1e-3)
+
+
 def test_a_lid_over_air_at_rest_limits_the_step():
     def moving(wall: WallPlane) -> WallPlane:
         return eqx.tree_at(lambda w: w.tangent_m_s[0], wall, 2.0 * jnp.ones_like(wall.normal_m_s))
@@ -93,7 +118,7 @@ def test_a_lid_over_air_at_rest_limits_the_step():
     model = flat_room(8, 1e-4, (as_it_is, as_it_is), (as_it_is, moving), 0.0)
     still = air_at_rest(model, jnp.zeros(model.grid.cells), 0.1)
 
-    # 2 m/s over cells of 1/8 m at a Courant number of 0.45: 28 ms; without the lid diffusion would allow 13 s.
+    # 2 m/s over cells of 1/8 m at a Courant number of 0.45: 28 ms; without the lid diffusion would allow 26 s.
     assert 0.02 < float(longest_step_s(still, model, 0.45)) <= 0.45 / 16
 
 
