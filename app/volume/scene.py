@@ -192,7 +192,7 @@ def known_boundary(volume: RoomVolume, information: Information) -> list[Boundar
         known += _outlet(volume)
         known += [_wall(name, wall, volume, information) for name, wall in _WALLS.items()]
     if information == "surveyed" and volume.case.get("heater"):
-        known.append(_heater(volume))
+        known.append(heater_of(volume))
     return known
 
 
@@ -289,18 +289,25 @@ def _outlet(volume: RoomVolume) -> list[Outlet]:
 
 
 def _mean_on_plane(volume: RoomVolume, patch: Patch) -> float:
-    """Mean temperature over a patch of the plane x_min."""
-    inside_y, inside_z = (
-        (axis >= low - 1e-6) & (axis <= high + 1e-6)
-        for axis, low, high in zip((volume.y_m, volume.z_m), patch.lower_m, patch.upper_m, strict=True)
-    )
-    values = volume.temperature_k[0][np.ix_(inside_y, inside_z)]
+    """Mean temperature over a patch of the plane x_min, away from its rim: there a vertex is half wall."""
+    (low_y, low_z), (high_y, high_z) = patch.lower_m, patch.upper_m
+    inside = _inside(volume.y_m, low_y, high_y), _inside(volume.z_m, low_z, high_z)
+    values = volume.temperature_k[0][np.ix_(*inside)]
     if values.size == 0:
         raise BadInputError(
             f"The outlet {patch.lower_m} to {patch.upper_m} m lies between the volume's vertices; "
             "resample the volume on a finer grid."
         )
     return float(values.mean(dtype=np.float64))
+
+
+def _inside(axis_m: np.ndarray, lower_m: float, upper_m: float) -> np.ndarray:
+    """Which vertices lie within, more than half a spacing from the ends if any do."""
+    rim_m = 0.5 * float(np.diff(axis_m).max())
+    away, all_of_it = (
+        (axis_m >= lower_m + margin_m) & (axis_m <= upper_m - margin_m) for margin_m in (rim_m, -1e-6)
+    )
+    return away if away.any() else all_of_it
 
 
 def _wall(name: str, wall: WallName, volume: RoomVolume, information: Information) -> Wall:
@@ -316,7 +323,8 @@ def _wall(name: str, wall: WallName, volume: RoomVolume, information: Informatio
     return Wall(wall=wall)
 
 
-def _heater(volume: RoomVolume) -> Heater:
+def heater_of(volume: RoomVolume) -> Heater:
+    """The heated panel of the floor that the volume's case names."""
     heater = volume.case["heater"]
     x, y = heater["x"], heater["y"]
     return Heater(

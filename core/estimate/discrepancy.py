@@ -7,9 +7,13 @@ K has three parts: errors of the profile over height, local errors in the x-z se
 level (the mean). Images do not see the level; thermometers do (a plane, outlets, sensors). A plane on a wall
 of unknown temperature lies in that wall's thermal layer, which the model may have wrong by one constant: that
 constant is estimated too. Walls of stated temperature keep it. The velocity is not corrected.
+
+The size of the correction, and the error of images and planes beyond their noise, are those under which the
+residual is most likely (maximum marginal likelihood): a room that the data contradict is corrected further, and
+is less certain, than one that they confirm.
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import equinox as eqx
 import jax
@@ -17,6 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import block_diag
+from scipy.optimize import minimize
 
 from core.estimate.least_squares import spread
 from core.estimate.observation import IMAGES, PLANES, Observations, ShiftBlocks
@@ -32,19 +37,45 @@ _LATTICE = (9, 11)
 _LENGTH_SHARE = 0.2
 # Of K's variance: errors of the profile over height, and local errors.
 _PROFILE_PART, _LOCAL_PART = 0.7, 0.3
-# Of the residual, this share is taken as representation error: no smooth correction can explain it.
-_UNEXPLAINED = 0.5
-# Standard deviations as shares of the rms departure of T from its mean at each height: the correction's; that of
-# one point from the mean along y; that of the layer of a plane on a wall of unknown temperature.
-_DEPARTURE_SHARE, _POINT_SHARE, _LAYER_SHARE = 0.1, 0.3, 1.0
+# Share of the variance that the mean along y keeps, of an error as short along y as along x and z: the mean of
+# exp(-|a - b| / l) over a and b from 0 to 1.
+_SEEN_SHARE = 2 * _LENGTH_SHARE - 2 * _LENGTH_SHARE**2 * (1 - np.exp(-1 / _LENGTH_SHARE))
+# Standard deviations as shares of the rms departure of T from its mean at each height: the correction's before any
+# data, known to a factor e; that of the layer of a plane on a wall of unknown temperature.
+_DEPARTURE_SHARE, _LAYER_SHARE = 0.1, 1.0
 
 
 class Correction(eqx.Module):
-    """The correction on vertices, and its prior and posterior variance; all constant along y."""
+    """The correction on vertices, and its prior and posterior variance; all constant along y.
+
+    `point_k2` is the variance of one point about the mean along y.
+    """
 
     excess_k: Float[np.ndarray, "vx vz"]
     prior_variance_k2: Float[np.ndarray, "vx vz"]
     variance_k2: Float[np.ndarray, "vx vz"]
+    point_k2: float
+
+
+class _Residuals(eqx.Module):
+    """Residuals of one kind and their derivatives in the coefficients and the planes' layers.
+
+    `start` is the kind's error beyond noise from which the search begins; None: thermometers, which read one point
+    where the correction is a mean along y.
+    """
+
+    residual: Float[np.ndarray, " data"]
+    noise: Float[np.ndarray, " data"]
+    design: Float[np.ndarray, "data unknowns"]
+    start: float | None
+
+
+class _Fitted(eqx.Module):
+    """Coefficients, their covariance, and the logarithm of the residuals' probability."""
+
+    mean: Float[np.ndarray, " unknowns"]
+    covariance: Float[np.ndarray, "unknowns unknowns"]
+    log_evidence: float
 
 
 def temperature_correction(
@@ -66,12 +97,35 @@ def temperature_correction(
         for m, n in zip(_LATTICE, (nx, nz), strict=True)
     )
     basis = np.einsum("xi,zj->ijxz", along_x, along_z).reshape(-1, nx, nz)
-    _, variance, group = data.values()
-    prior = _prior_k2(_DEPARTURE_SHARE * departure_k) + level_std_k**2
+    kinds = _kinds(data, excess_k, residual, basis, unknown_walls)
     layers = sum(plane.wall in unknown_walls for plane in data.planes)
-    layer = np.eye(layers) / (_LAYER_SHARE * departure_k) ** 2
-    known = np.asarray(block_diag(np.linalg.inv(prior), layer))
-    gained = np.zeros(len(known))
+    layer_k2 = np.eye(layers) * (_LAYER_SHARE * departure_k) ** 2
+
+    def prior_k2(std_k: float) -> np.ndarray:
+        return np.asarray(block_diag(_prior_k2(std_k) + level_std_k**2, layer_k2))
+
+    std_k, errors = _sizes(kinds, prior_k2, _DEPARTURE_SHARE * departure_k)
+    prior = prior_k2(std_k)
+    fitted = _fit(kinds, prior, errors, _point_k2(std_k))
+    size = len(basis)
+    before, after = (
+        np.einsum("ixz,ixz->xz", basis, np.tensordot(c[:size, :size], basis, axes=1))
+        for c in (prior, fitted.covariance)
+    )
+    return Correction(np.tensordot(fitted.mean[:size], basis, axes=1), before, after, _point_k2(std_k))
+
+
+def _kinds(
+    data: Observations,
+    excess_k: Float[np.ndarray, "vx vy vz"],
+    residual: Float[np.ndarray, " data"],
+    basis: Float[np.ndarray, "lattice vx vz"],
+    unknown_walls: Collection[str],
+) -> list[_Residuals]:
+    """What there is of images, planes, sensors and outlets."""
+    _, variance, group = data.values()
+    layers = sum(plane.wall in unknown_walls for plane in data.planes)
+    found = []
     for g, design in (
         (IMAGES, _shift_design(data, excess_k, basis)),
         (PLANES, _plane_design(data, excess_k, basis)),
@@ -80,22 +134,64 @@ def temperature_correction(
     ):
         own = group == g
         if own.any():
-            # A thermometer reads one point, and the correction is a mean along y.
-            pooled = g in (IMAGES, PLANES)
-            error = _UNEXPLAINED * spread(residual[own]) if pooled else _POINT_SHARE * departure_k
-            weight = 1.0 / (variance[own] + error**2) / (_CORRELATED if pooled else 1.0)
             extra = _layer_design(data, unknown_walls) if g == PLANES else np.zeros((len(design), layers))
-            whole = np.concatenate([design, extra], axis=1)
-            known = known + (whole.T * weight) @ whole
-            gained = gained + (whole.T * weight) @ residual[own]
-    size = len(basis)
+            # The square root of the noise keeps the search's start above zero where a room fits exactly.
+            least = 0.01 * float(np.sqrt(np.median(variance[own])))
+            start = max(0.5 * spread(residual[own]), least) if g in (IMAGES, PLANES) else None
+            found.append(
+                _Residuals(residual[own], variance[own], np.concatenate([design, extra], axis=1), start)
+            )
+    return found
+
+
+def _sizes(
+    kinds: list[_Residuals], prior_k2: Callable[[float], np.ndarray], expected_k: float
+) -> tuple[float, list[float]]:
+    """The correction's standard deviation and each pooled kind's error: where the residuals are most likely."""
+    starts = np.array([kind.start for kind in kinds if kind.start is not None])
+
+    def loss(logs: np.ndarray) -> float:
+        std_k, errors = expected_k * np.exp(logs[0]), starts * np.exp(logs[1:])
+        fitted = _fit(kinds, prior_k2(std_k), list(errors), _point_k2(std_k))
+        return 0.5 * logs[0] ** 2 - fitted.log_evidence
+
+    if not kinds:
+        return expected_k, []
+    first = np.zeros(1 + len(starts))
+    simplex = np.concatenate([first[None], first + np.eye(len(first))])
+    found = minimize(
+        loss, first, method="Nelder-Mead",
+        options={"initial_simplex": simplex, "xatol": 0.01, "fatol": 0.01, "maxfev": 300},
+    ).x  # fmt: skip
+    return float(expected_k * np.exp(found[0])), [float(e) for e in starts * np.exp(found[1:])]
+
+
+def _fit(
+    kinds: list[_Residuals],
+    prior: Float[np.ndarray, "unknowns unknowns"],
+    errors: list[float],
+    point_k2: float,
+) -> _Fitted:
+    """Linear least squares: normal residuals, of which `_CORRELATED` of a pooled kind count as one."""
+    known = np.linalg.inv(prior)
+    gained, unlikely, left = np.zeros(len(known)), 0.0, iter(errors)
+    for kind in kinds:
+        pooled = kind.start is not None
+        variance = kind.noise + (next(left) ** 2 if pooled else point_k2)
+        count = 1.0 / _CORRELATED if pooled else 1.0
+        weight = count / variance
+        known = known + (kind.design.T * weight) @ kind.design
+        gained = gained + (kind.design.T * weight) @ kind.residual
+        unlikely += count * float(np.log(variance).sum()) + float(weight @ kind.residual**2)
     covariance = np.linalg.inv(known)
-    coefficients = (covariance @ gained)[:size]
-    before, after = (
-        np.einsum("ixz,ixz->xz", basis, np.tensordot(c, basis, axes=1))
-        for c in (prior, covariance[:size, :size])
-    )
-    return Correction(np.tensordot(coefficients, basis, axes=1), before, after)
+    mean = covariance @ gained
+    unlikely += float(np.linalg.slogdet(known)[1] + np.linalg.slogdet(prior)[1]) - float(gained @ mean)
+    return _Fitted(mean, covariance, -0.5 * unlikely)
+
+
+def _point_k2(std_k: float) -> float:
+    """Variance of a point about the mean along y, where that mean has the standard deviation `std_k`."""
+    return float((1.0 / _SEEN_SHARE - 1.0) * std_k**2)
 
 
 def _layer_design(data: Observations, unknown_walls: Collection[str]) -> Float[np.ndarray, "data layers"]:

@@ -26,7 +26,7 @@ from core.room.boundary_conditions import RoomLayout
 from core.room.vertices import RoomFields
 
 # Shares a, c and b of `core.estimate.uncertainty`.
-_SHARES = {"excess_k": (0.1, 0.3, 1.0), "pressure_m2_s2": (0.3, 1.0, 1.0), "velocity_m_s": (0.2, 5.0, 0.3)}
+_SHARES = {"excess_k": (0.1, 0.3, 0.0), "pressure_m2_s2": (0.3, 1.0, 1.0), "velocity_m_s": (0.2, 5.0, 0.3)}
 # If the thermometers moved the level of T, half of that move is added to its standard deviation: they stand in a few
 # places, and the model was wrong there.
 _DOUBT = 0.5
@@ -70,13 +70,12 @@ def solution(
     x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(start.excess_k.shape))
     excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     moved_k = float(layer_means(excess - analysis.before.fields.excess_k).mean())
-    before, after = (
-        (v[:, None, :] + (_DOUBT * moved_k) ** 2) * free
-        for v in (change.prior_variance_k2, change.variance_k2)
-    )
+    variances = change.prior_variance_k2, change.variance_k2
+    before, after = ((v[:, None, :] + (_DOUBT * moved_k) ** 2) * free for v in variances)
     bent = hydrostatic_variance_m4_s4(problem, z, before), hydrostatic_variance_m4_s4(problem, z, after)
+    of_points = change.point_k2 * free
     seen = explained(analysis.data, best.fields)
-    temperature = _deviation(analysis, "excess_k", local_k, seen, (before, after))
+    temperature = _deviation(analysis, "excess_k", local_k, seen, (before + of_points, after + of_points))
     pressure = _deviation(analysis, "pressure_m2_s2", departure(best.fields.pressure_m2_s2), seen, bent)
     velocity = _deviation(analysis, "velocity_m_s", rms(best.fields.velocity_m_s), seen)
     return Solution(

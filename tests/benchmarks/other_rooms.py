@@ -114,9 +114,8 @@ ROOMS = {
 }
 
 
-def made(name: str) -> tuple[dict[str, Any], dict[str, Any]]:
+def marched(name: str, what: Made) -> tuple[dict[str, Any], dict[str, Any]]:
     """The room's arrays and a row about how it was made."""
-    what = ROOMS[name]
     began_s = time.process_time()
     volume = _empty(name, what)
     scene = room_scene(volume, RigOptions(), "surveyed")
@@ -229,8 +228,9 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", choices=sorted(ROOMS), action="append")
     options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
     for name in options.only or ROOMS:
-        arrays, row = made(name)
+        arrays, row = marched(name, ROOMS[name])
         np.savez_compressed(options.folder / f"{name}.npz", **arrays)
         print(json.dumps(row), flush=True)
 

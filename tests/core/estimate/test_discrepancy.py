@@ -4,7 +4,7 @@ from core.estimate.discrepancy import Correction, temperature_correction
 from core.estimate.observation import Observations, observations
 from core.estimate.posterior import hydrostatic_m2_s2, hydrostatic_variance_m4_s4
 from core.geometry import Box, looking_along_y
-from core.problem import PlaneData, Problem
+from core.problem import PlaneData, Problem, SensorData
 from core.scene import FixedTexture, Outlet, Patch, Scene, View
 
 VERTICES = (17, 13, 15)
@@ -14,7 +14,9 @@ PREDICTED_K = 4.0
 DEPARTURE_K = 0.2
 
 
-def data(*planes: PlaneData, leaving_k: float | None = None) -> Observations:
+def data(
+    *planes: PlaneData, leaving_k: float | None = None, sensors: tuple[SensorData, ...] = ()
+) -> Observations:
     """No pictures: thermometers alone."""
     camera = looking_along_y(position_m=(1.5, -8.0, 1.2), width_px=64, height_px=48, focal_px=150.0)
     mean_k = None if leaving_k is None else 293.15 + leaving_k
@@ -29,7 +31,7 @@ def data(*planes: PlaneData, leaving_k: float | None = None) -> Observations:
         light=FixedTexture(),
         boundary=(exhaust,),
     )
-    return observations(Problem(scene, (), planes), VERTICES)
+    return observations(Problem(scene, (), planes, sensors), VERTICES)
 
 
 def plane(excess_k: float) -> PlaneData:
@@ -49,7 +51,9 @@ def test_what_leaves_moves_the_level_as_far_as_it_was_open():
 
     np.testing.assert_allclose(free.excess_k, 0.3, atol=0.02)
     assert np.ptp(free.excess_k) < 0.01
-    assert np.abs(held.excess_k).max() < 0.05
+    # What contradicts a level that is known is an error of the place.
+    assert np.abs(held.excess_k).max() < 0.1
+    assert held.point_k2 > 10 * (0.1 * DEPARTURE_K) ** 2
     assert (free.variance_k2 < 0.02 * free.prior_variance_k2).all()
 
 
@@ -63,6 +67,27 @@ def test_a_plane_says_less_of_the_level_where_its_walls_layer_is_unknown():
     assert (unknown.excess_k < 0.75 * stated.excess_k).all()
     assert (unknown.variance_k2 > 2.0 * stated.variance_k2).all()
     assert (unknown.variance_k2 < unknown.prior_variance_k2).all()
+
+
+def pole(wrong_k: float) -> SensorData:
+    """Nine thermometers above one another, wrong by so much to both sides of the prediction."""
+    z_m = np.linspace(0.2, 2.2, 9)
+    positions_m = np.stack([np.full(9, 1.5), np.zeros(9), z_m], axis=1)
+    read_k = 293.15 + PREDICTED_K + wrong_k * np.cos(np.pi * z_m / 2.4)
+    nothing = np.full((9, 3), np.nan)
+    return SensorData(positions_m, read_k, np.full(9, 0.02), nothing, np.full(9, 0.1))
+
+
+def test_a_room_that_thermometers_contradict_is_corrected_further_and_is_less_certain():
+    z_m = np.linspace(0.0, 2.4, VERTICES[2])
+    confirmed, contradicted = (corrected(data(sensors=(pole(k),)), 0.01) for k in (0.02, 1.0))
+
+    # One point says less of the mean along y, which the correction is, than it is itself wrong.
+    share = np.polyfit(np.cos(np.pi * z_m / 2.4), contradicted.excess_k[8], 1)[0]
+    assert 0.3 < share < 0.9
+    assert confirmed.point_k2 < 4 * (0.1 * DEPARTURE_K) ** 2
+    assert contradicted.point_k2 > 100 * confirmed.point_k2
+    assert contradicted.variance_k2.mean() > 10 * confirmed.variance_k2.mean()
 
 
 def test_without_data_nothing_moves_and_nothing_is_learnt():

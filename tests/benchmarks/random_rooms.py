@@ -1,0 +1,186 @@
+"""Rooms drawn at random, fitted as an operator would: how large the error is, and whether the result knows it.
+
+One to three supplies and an outlet on x_min, 0.05 to 1 m/s, -10 to +10 K, boxes of 2.4 to 8 m, walls adiabatic or of
+their own temperature, and in half of the rooms a heated panel of the floor, which half of these operators state. The
+truth is marched by `core.room` under k-epsilon with other constants, or under the zero-equation closure, on a finer
+grid; entries are misread as far as their deviations say. Rooms of even number are for choosing anything, those of odd
+number for figures; from 1000 on they are for nobody to look at.
+
+    python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32]
+    python -m tests.benchmarks.random_rooms FOLDER --summary
+
+Volumes and rows stay in FOLDER; a room that has its row is not fitted again.
+"""
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.bench.room_fit import fit_row, problem_of
+from app.reconstruct.problem import with_scene
+from app.volume.file import read_volume
+from app.volume.misread import misread
+from app.volume.scene import heater_of
+from core.metrics import inner
+from core.problem import Problem
+from core.solve.room import RoomSettings
+from tests.benchmarks.other_rooms import T0_K, Made, marched
+
+_SEED = 2611
+_NAMES = ("xMinWall", "xMaxWall", "front", "back", "floor", "ceiling")
+# Between two openings, and between an opening and the wall's edge.
+_MARGIN_M = 0.1
+
+
+def drawn(number: int) -> Made:
+    """The room of this number."""
+    draw = np.random.default_rng([_SEED, number])
+    size = np.round([draw.uniform(2.4, 8.0), draw.uniform(2.4, 8.0), draw.uniform(2.4, 3.6)], 1)
+    domain = (0.0, float(size[0]), -float(size[1]) / 2, float(size[1]) / 2, 0.0, float(size[2]))
+    openings = _openings(draw, int(draw.integers(2, 5)), domain)
+    inlets = tuple(
+        {
+            **place,
+            "U": round(float(np.exp(draw.uniform(np.log(0.05), 0.0))), 3),
+            "dT": round(float(draw.uniform(-10.0, 10.0)), 2),
+        }
+        for place in openings[1:]
+    )
+    adiabatic = tuple(name for name in _NAMES if draw.random() < 0.4)
+    supply_m3_s = sum(i["U"] * float(np.ptp(i["y"]) * np.ptp(i["z"])) for i in inlets)
+    walls = tuple((name, T0_K + round(float(2.0 * draw.standard_normal()), 2)) for name in _NAMES)
+    return Made(
+        domain=domain,
+        vertices=tuple(int(n) for n in np.clip(np.round(size * 14), 40, 64)),  # type: ignore[arg-type]
+        closure="k_epsilon" if draw.random() < 0.7 else "zero_equation",
+        cells=44,
+        title=f"room {number}, drawn at random",
+        inlets=inlets,
+        outlet=openings[0],
+        heater=_heater(draw, domain) if draw.random() < 0.5 else None,
+        wall_t=tuple(wall for wall in walls if wall[0] not in adiabatic),
+        adiabatic=adiabatic,
+        heat_factor=float(np.exp(0.3 * draw.standard_normal())),
+        closure_factor=float(np.exp(0.25 * draw.standard_normal())),
+        # An air change, within limits: after less the air's level still moves.
+        settle_s=float(np.clip(np.prod(size) / supply_m3_s, 200.0, 1500.0)),
+        refine_s=60.0,
+    )
+
+
+def _openings(draw: np.random.Generator, count: int, domain: tuple[float, ...]) -> list[dict[str, Any]]:
+    """Rectangles of x_min that do not meet."""
+    found: list[dict[str, Any]] = []
+    while len(found) < count:
+        width, height = draw.uniform(0.3, 1.2), draw.uniform(0.15, 0.5)
+        y = draw.uniform(domain[2] + _MARGIN_M, domain[3] - _MARGIN_M - width)
+        z = draw.uniform(_MARGIN_M, domain[5] - _MARGIN_M - height)
+        new = {"y": [round(y, 2), round(y + width, 2)], "z": [round(z, 2), round(z + height, 2)]}
+        if all(_apart(new, old, "y") or _apart(new, old, "z") for old in found):
+            found.append(new)
+    return found
+
+
+def _apart(one: dict[str, Any], other: dict[str, Any], axis: str) -> bool:
+    return one[axis][0] > other[axis][1] + _MARGIN_M or other[axis][0] > one[axis][1] + _MARGIN_M
+
+
+def _heater(draw: np.random.Generator, domain: tuple[float, ...]) -> dict[str, Any]:
+    side = draw.uniform(0.4, 1.0)
+    x, y = (draw.uniform(low + 0.2, high - 0.2 - side) for low, high in (domain[:2], domain[2:4]))
+    return {
+        "x": [round(x, 2), round(x + side, 2)],
+        "y": [round(y, 2), round(y + side, 2)],
+        "dT": round(float(draw.uniform(15.0, 60.0)), 1),
+    }
+
+
+def row_of(folder: Path, number: int, cells: int) -> dict[str, Any]:
+    """Make the room if it is not there, fit it, and say how far off the result is and what it says of itself."""
+    path, what = folder / f"room{number}.npz", drawn(number)
+    if not path.exists():
+        arrays, made = marched(f"room{number}", what)
+        (folder / f"room{number}.json").write_text(json.dumps(made))
+        np.savez_compressed(path, **arrays)
+    problem, volume = problem_of(path, "operator", "texture", "paper", number)
+    stated = what.heater is not None and number % 4 >= 2
+    problem = _entered(problem, number, heater_of(read_volume(path)) if stated else None)
+    fit = fit_row(problem, volume, RoomSettings(cells=cells))
+    said = " ".join(fit["notes"])
+    carried_k = inner(volume.temperature_k[:1] - volume.temperature_k)
+    return {
+        "room": number,
+        "closure": what.closure,
+        "supplies": len(what.inlets),
+        "heater": None if what.heater is None else ("stated" if stated else "not stated"),
+        **fit,
+        "carried_T_rms_k": float(np.sqrt(np.mean(carried_k**2))),
+        "distrusts": "distrust the velocity" in said,
+        "checks": "Check it" in said,
+    }
+
+
+def _entered(problem: Problem, number: int, heater: Any) -> Problem:
+    """The problem as an operator enters it: the heater if it is stated, and every entry misread."""
+    scene = problem.scene
+    if heater is not None:
+        scene = replace(scene, boundary=(*scene.boundary, heater))
+    return with_scene(problem, misread(scene, number))
+
+
+def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Medians, pooled and least coverage, and how often the results say the right thing of themselves."""
+    u = np.array([row["u_rel"] for row in rows])
+    distrusts = np.array([row["distrusts"] for row in rows])
+
+    def share(of: np.ndarray) -> str:
+        return f"{int(distrusts[of].sum())} of {int(of.sum())}"
+
+    return {
+        "rooms": len(rows),
+        "u_median": float(np.median(u)),
+        "T_over_carried_median": float(np.median([row["T_rms_k"] / row["carried_T_rms_k"] for row in rows])),
+        **{
+            f"{name}_{what}": float(how([row[name] for row in rows]))
+            for name in ("T_within", "u_within")
+            for what, how in (("pooled", np.mean), ("least", np.min))
+        },
+        "distrusts_above_0.6": share(u > 0.6),
+        "distrusts_below_0.3": share(u < 0.3),
+        "checks": f"{sum(row['checks'] for row in rows)} of {len(rows)}",
+        "cpu_s_median": float(np.median([row["cpu_s"] for row in rows])),
+    }
+
+
+def main() -> None:
+    """Make, fit and tell rooms."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--rooms", type=int, default=12, help="every second one from --first")
+    parser.add_argument("--cells", type=int, default=32)
+    parser.add_argument("--summary", action="store_true")
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    rows = options.folder / "rows.jsonl"
+    done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
+    if options.summary:
+        print(json.dumps(summary([row for row in done if row["room"] % 2])))
+        return
+    for number in range(options.first, options.first + 2 * options.rooms, 2):
+        if any(row["room"] == number for row in done):
+            continue
+        row = row_of(options.folder, number, options.cells)
+        with rows.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+        print(json.dumps(row), flush=True)
+
+
+if __name__ == "__main__":
+    main()
