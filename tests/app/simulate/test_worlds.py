@@ -12,7 +12,10 @@ from app.errors import BadInputError
 from app.experiment.captures import newest_pair
 from app.experiment.folder import open_experiment
 from app.pipeline import reconstruct
+from app.reconstruct.measure import between_references
+from app.reconstruct.problem import known_of
 from app.rig.open import air_of, open_camera
+from app.rig.rendered import drifted
 from app.simulate.rehearsal import Rehearsal, calibrate_simulated, rehearse
 from app.simulate.worlds import IDEAL, LAB, changed, one_by_one
 from app.volume.file import read_volume
@@ -118,6 +121,25 @@ def test_a_labs_world_is_what_simulate_shows_unless_it_is_asked_for_the_ideal_on
         stand_offs_m.append(settings.scene.room.upper_m[1] - settings.scene.views[0].camera.position_m[1])
     assert cameras == [LAB.camera(0), IDEAL.camera(0)]
     assert stand_offs_m == pytest.approx([4.0, 30.5])
+
+
+def test_marks_and_a_second_reference_are_asked_for_by_name(tmp_path):
+    folder = tmp_path / "e"
+    arguments = ["simulate", str(folder), "--truth", str(ROOM), "--camera-px", "320", "--frames", "20"]
+    words = ["--marks", "--bracketed", "--set", "covered=0", "--set", "breathing_px=0"]
+    done = CliRunner().invoke(create_cli(), [*arguments, *words], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    experiment = open_experiment(folder)
+    scene = known_of(experiment).scene
+    assert [marks.name for marks in scene.views[0].marks] == ["left board", "right board"]
+    captures = newest_pair(experiment)
+    assert set(captures.names) == {"reference", "flow", "after"}
+    # The mount took a step before the flow, and another one after it.
+    moved = between_references(captures, scene)
+    assert moved.agree
+    steps = [drifted(scene, 0, LAB.drift_px, 0.0, seed).views[0].camera.principal_px for seed in (0, 1)]
+    walked = np.sum([np.subtract(step, scene.views[0].camera.principal_px) for step in steps], axis=0)
+    assert (moved.drift.column_px, moved.drift.row_px) == pytest.approx(tuple(walked), abs=0.02)
 
 
 def test_a_rehearsal_stands_in_a_lab_and_its_pictures_find_the_temperature(tmp_path):
