@@ -24,7 +24,7 @@ from scipy.linalg import block_diag
 from scipy.optimize import minimize
 
 from core.estimate.least_squares import spread
-from core.estimate.observation import IMAGES, PLANES, Observations, ShiftBlocks
+from core.estimate.observation import IMAGES, OUTLETS, PLANES, Observations, ShiftBlocks
 from core.geometry import face_of
 from core.room.vertices import linear_matrix
 
@@ -40,9 +40,9 @@ _PROFILE_PART, _LOCAL_PART = 0.7, 0.3
 # Share of the variance that the mean along y keeps, of an error as short along y as along x and z: the mean of
 # exp(-|a - b| / l) over a and b from 0 to 1.
 _SEEN_SHARE = 2 * _LENGTH_SHARE - 2 * _LENGTH_SHARE**2 * (1 - np.exp(-1 / _LENGTH_SHARE))
-# Standard deviations as shares of the rms departure of T from its mean at each height: the correction's before any
-# data, known to a factor e; that of the layer of a plane on a wall of unknown temperature.
-_DEPARTURE_SHARE, _LAYER_SHARE = 0.1, 1.0
+# Standard deviation of the layer of a plane on a wall of unknown temperature, as a share of the rms departure of T
+# from its mean at each height.
+_LAYER_SHARE = 1.0
 
 
 class Correction(eqx.Module):
@@ -84,12 +84,15 @@ def temperature_correction(
     residual: Float[np.ndarray, " data"],
     departure_k: float,
     level_std_k: float,
+    wrong_share: float,
     unknown_walls: Collection[str] = (),
+    outlet_std_k: float = 0.0,
 ) -> Correction:
     """Fit the correction to `residual`, the data minus the prediction from `excess_k`.
 
-    `departure_k` is the rms departure of T from its mean at each height; `level_std_k` is the prior standard
-    deviation of the level.
+    `departure_k` is the rms departure of T from its mean at each height, of which a point is expected to be wrong by
+    `wrong_share`, known to a factor e; `level_std_k` is the prior standard deviation of the level; `outlet_std_k` is
+    how far what leaves may be, in the model, from the air at the outlet's height.
     """
     nx, _, nz = excess_k.shape
     along_x, along_z = (
@@ -97,14 +100,14 @@ def temperature_correction(
         for m, n in zip(_LATTICE, (nx, nz), strict=True)
     )
     basis = np.einsum("xi,zj->ijxz", along_x, along_z).reshape(-1, nx, nz)
-    kinds = _kinds(data, excess_k, residual, basis, unknown_walls)
+    kinds = _kinds(data, excess_k, residual, basis, unknown_walls, outlet_std_k)
     layers = sum(plane.wall in unknown_walls for plane in data.planes)
     layer_k2 = np.eye(layers) * (_LAYER_SHARE * departure_k) ** 2
 
     def prior_k2(std_k: float) -> np.ndarray:
         return np.asarray(block_diag(_prior_k2(std_k) + level_std_k**2, layer_k2))
 
-    std_k, errors = _sizes(kinds, prior_k2, _DEPARTURE_SHARE * departure_k)
+    std_k, errors = _sizes(kinds, prior_k2, wrong_share * departure_k * float(np.sqrt(_SEEN_SHARE)))
     prior = prior_k2(std_k)
     fitted = _fit(kinds, prior, errors, _point_k2(std_k))
     size = len(basis)
@@ -121,6 +124,7 @@ def _kinds(
     residual: Float[np.ndarray, " data"],
     basis: Float[np.ndarray, "lattice vx vz"],
     unknown_walls: Collection[str],
+    outlet_std_k: float,
 ) -> list[_Residuals]:
     """What there is of images, planes, sensors and outlets."""
     _, variance, group = data.values()
@@ -130,7 +134,7 @@ def _kinds(
         (IMAGES, _shift_design(data, excess_k, basis)),
         (PLANES, _plane_design(data, excess_k, basis)),
         (2, _sensor_design(data)),
-        (4, _outlet_design(data)),
+        (OUTLETS, _outlet_design(data)),
     ):
         own = group == g
         if own.any():
@@ -138,16 +142,19 @@ def _kinds(
             # The square root of the noise keeps the search's start above zero where a room fits exactly.
             least = 0.01 * float(np.sqrt(np.median(variance[own])))
             start = max(0.5 * spread(residual[own]), least) if g in (IMAGES, PLANES) else None
-            found.append(
-                _Residuals(residual[own], variance[own], np.concatenate([design, extra], axis=1), start)
-            )
+            noise = variance[own] + (outlet_std_k**2 if g == OUTLETS else 0.0)
+            found.append(_Residuals(residual[own], noise, np.concatenate([design, extra], axis=1), start))
     return found
 
 
 def _sizes(
     kinds: list[_Residuals], prior_k2: Callable[[float], np.ndarray], expected_k: float
 ) -> tuple[float, list[float]]:
-    """The correction's standard deviation and each pooled kind's error: where the residuals are most likely."""
+    """The correction's standard deviation, and each pooled kind's error.
+
+    The errors are those under which the residuals are most likely. The correction's variance is the mean over all
+    that the residuals leave possible: where they say little it stays wide.
+    """
     starts = np.array([kind.start for kind in kinds if kind.start is not None])
 
     def loss(logs: np.ndarray) -> float:
@@ -155,15 +162,17 @@ def _sizes(
         fitted = _fit(kinds, prior_k2(std_k), list(errors), _point_k2(std_k))
         return 0.5 * logs[0] ** 2 - fitted.log_evidence
 
-    if not kinds:
-        return expected_k, []
     first = np.zeros(1 + len(starts))
     simplex = np.concatenate([first[None], first + np.eye(len(first))])
-    found = minimize(
+    best = minimize(
         loss, first, method="Nelder-Mead",
         options={"initial_simplex": simplex, "xatol": 0.01, "fatol": 0.01, "maxfev": 300},
     ).x  # fmt: skip
-    return float(expected_k * np.exp(found[0])), [float(e) for e in starts * np.exp(found[1:])]
+    logs = best[0] + np.linspace(-4.0, 4.0, 33)
+    losses = np.array([loss(np.array([log, *best[1:]])) for log in logs])
+    likely = np.exp(losses.min() - losses)
+    std_k = expected_k * np.sqrt(likely @ np.exp(2.0 * logs) / likely.sum())
+    return float(std_k), [float(e) for e in starts * np.exp(best[1:])]
 
 
 def _fit(

@@ -28,6 +28,7 @@ from core.view_frame import facing
 _BLOCKS_ACROSS = 28
 # Kinds of data in `Observations.values` whose neighbours have correlated errors.
 IMAGES, PLANES = 0, 1
+OUTLETS = 4
 
 
 class ShiftBlocks(eqx.Module):

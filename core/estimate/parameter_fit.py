@@ -188,6 +188,7 @@ def held_fit(
     derivatives: Derivatives,
     settings: RoomSettings,
     marches: Marches,
+    outlet_std_k: float,
 ) -> ForwardRun:
     """The room `before`, marched on while held at the measured mean temperatures; the longest march is the last.
 
@@ -195,7 +196,7 @@ def held_fit(
     """
     held, left, doing = before, 1.0, "hold the temperatures that measurements say"
     for seconds in (settings.refine_s, settings.final_s):
-        held_k = to_hold_k(data, prior, derivatives, held, before, fine.layout)
+        held_k = to_hold_k(data, prior, derivatives, held, before, fine.layout, outlet_std_k)
         held = march_under(
             fine,
             before.parameters,

@@ -17,6 +17,7 @@ from core.estimate.temperature_nudging import (
     free_vertices,
     last_correction,
     layer_means,
+    outlets_apart_k,
     without_nudging,
 )
 from core.estimate.uncertainty import Deviation, Represented, deviation
@@ -66,7 +67,9 @@ def solution(
     local_k = departure(best.fields.excess_k)
     free = free_vertices(analysis.layout, best.fields.excess_k.shape)
     start = without_nudging(best.fields, analysis.before.fields, analysis.data, analysis.prior, free)
-    change = last_correction(analysis.data, analysis.prior, analysis.derivatives, start)
+    pairs = (analysis.other, analysis.coarse), (analysis.stated_room, analysis.before.fields)
+    outlets_k = outlets_apart_k(analysis.data, pairs)
+    change = last_correction(analysis.data, analysis.prior, analysis.derivatives, start, outlets_k)
     x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(start.excess_k.shape))
     excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     moved_k = float(layer_means(excess - analysis.before.fields.excess_k).mean())

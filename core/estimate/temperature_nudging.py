@@ -6,10 +6,13 @@ gives its jets the right buoyancy. For the final correction the held room is set
 (`without_nudging`); else the same error would be corrected twice.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 from jaxtyping import Float
 
 from core.estimate.discrepancy import Correction, temperature_correction
+from core.estimate.explained import explained
 from core.estimate.forward_runs import Derivatives, ForwardRun
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior
@@ -29,6 +32,7 @@ def to_hold_k(
     held: ForwardRun,
     before: ForwardRun,
     layout: RoomLayout,
+    outlet_std_k: float,
 ) -> Float[np.ndarray, " layers"]:
     """The mean excess temperature to hold: that of `before` with the correction; departures are those of `held`.
 
@@ -36,7 +40,7 @@ def to_hold_k(
     """
     free = free_vertices(layout, held.fields.excess_k.shape)
     start = without_nudging(held.fields, before.fields, data, prior, free)
-    change = last_correction(data, prior, derivatives, start).excess_k[:, None, :] * free
+    change = last_correction(data, prior, derivatives, start, outlet_std_k).excess_k[:, None, :] * free
     warmer_k = layer_means(start.excess_k + change) - layer_means(held.fields.excess_k)
     faces_m = layout.grid.faces_m(2)
     heights_m = np.linspace(faces_m[0], faces_m[-1], len(warmer_k))
@@ -56,24 +60,52 @@ def without_nudging(
     shift_k = layer_means(held.excess_k) - layer_means(before.excess_k)
     if not prior.unknown_walls():
         shift_k = np.full_like(shift_k, shift_k.mean())
-    outflow_k, box = held.outflow_excess_k.copy(), data.scene.room
-    heights_m = np.linspace(box.lower_m[2], box.upper_m[2], len(shift_k))
-    for n, outlet, _ in data.outlets:
-        patch, face = outlet.patch, face_of(outlet.patch.wall)
-        middle_m = 0.5 * (patch.lower_m[1] + patch.upper_m[1])
-        height_m = face.place_m(box) if face.axis == 2 else middle_m
-        outflow_k[n] -= float(np.interp(height_m, heights_m, shift_k))
+    outflow_k = held.outflow_excess_k.copy()
+    outflow_k[[n for n, *_ in data.outlets]] -= at_outlets(data, shift_k)
     return RoomFields(held.excess_k - shift_k * free, held.pressure_m2_s2, held.velocity_m_s, outflow_k)
 
 
 def last_correction(
-    data: Observations, prior: Prior, derivatives: Derivatives, fields: RoomFields
+    data: Observations, prior: Prior, derivatives: Derivatives, fields: RoomFields, outlet_std_k: float
 ) -> Correction:
-    """The correction of T for these fields (`core.estimate.discrepancy`)."""
+    """The correction of T for these fields (`core.estimate.discrepancy`).
+
+    T is expected to be wrong by the share of the room's own signal that the images leave.
+    """
     own_k = max(departure(fields.excess_k), _LEAST_DEPARTURE_K)
     level_k = max(own_k, level_std_k(derivatives))
     residual = data.values()[0] - data.predicted(fields)
-    return temperature_correction(data, fields.excess_k, residual, own_k, level_k, prior.unknown_walls())
+    wrong = explained(data, fields).left_over_own
+    walls = prior.unknown_walls()
+    return temperature_correction(data, fields.excess_k, residual, own_k, level_k, wrong, walls, outlet_std_k)
+
+
+def outlets_apart_k(data: Observations, pairs: Iterable[tuple[RoomFields, RoomFields]]) -> float:
+    """How far the outlets' air may be from the air at their height: what each pair of rooms differs by, added up.
+
+    An outlet may draw from a jet or a plume beside it, and which one does is where models differ.
+    """
+    apart = [_from_height_k(data, one) - _from_height_k(data, other) for one, other in pairs]
+    return float(np.sqrt(np.mean(np.square(apart)) * len(apart))) if data.outlets and apart else 0.0
+
+
+def _from_height_k(data: Observations, room: RoomFields) -> Float[np.ndarray, " outlets"]:
+    """What leaves by each measured outlet, minus the mean at its height."""
+    layers_k = layer_means(room.excess_k)
+    places = [n for n, *_ in data.outlets]
+    return room.outflow_excess_k[places] - at_outlets(data, layers_k)
+
+
+def at_outlets(data: Observations, layers_k: Float[np.ndarray, " vz"]) -> Float[np.ndarray, " outlets"]:
+    """A profile at the heights of the measured outlets."""
+    box = data.scene.room
+    heights_m = np.linspace(box.lower_m[2], box.upper_m[2], len(layers_k))
+    found = []
+    for _, outlet, _ in data.outlets:
+        patch, face = outlet.patch, face_of(outlet.patch.wall)
+        middle_m = 0.5 * (patch.lower_m[1] + patch.upper_m[1])
+        found.append(np.interp(face.place_m(box) if face.axis == 2 else middle_m, heights_m, layers_k))
+    return np.array(found, float)
 
 
 def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"]:

@@ -32,6 +32,7 @@ from core.estimate.plane_openings import with_plane_openings
 from core.estimate.posterior import Analysis, solution
 from core.estimate.prior import room_prior
 from core.estimate.schedule import fit_work
+from core.estimate.temperature_nudging import outlets_apart_k
 from core.problem import Problem
 from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
@@ -142,7 +143,10 @@ def fitted_room(
         found = fine_fit(fine, prior, data, vector, first, linearised, settings, marches)
     before = best = found.room
     if settings.use_images:
-        best = held_fit(fine, prior, data, before, derivatives, settings, marches)
+        outlets_k = outlets_apart_k(
+            data, ((other, linearised.start), (background.first.fields, before.fields))
+        )
+        best = held_fit(fine, prior, data, before, derivatives, settings, marches, outlets_k)
     return Analysis(
         background.problem,
         data,
@@ -170,6 +174,7 @@ def _by_ensemble(
     doing = "march the coarse room as corrected"
     base = march_under(coarse, parameters, found.flow, settings.restart_s, vertices, marches, doing=doing)
     other = run_under_other_closure(coarse, parameters, base, settings, vertices, marches)
+    outlets_k = outlets_apart_k(data, ((other, base.fields), (background.first.fields, found.room.fields)))
     return Analysis(
         background.problem,
         data,
@@ -182,7 +187,7 @@ def _by_ensemble(
         first=found.room.fields,
         other=other,
         before=found.room,
-        best=held_fit(fine, prior, data, found.room, found.stated, settings, marches),
+        best=held_fit(fine, prior, data, found.room, found.stated, settings, marches, outlets_k),
         layout=fine.layout,
     )
 

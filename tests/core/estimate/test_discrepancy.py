@@ -12,6 +12,8 @@ Y, Z = np.linspace(-1.0, 1.0, 25), np.linspace(0.0, 2.4, 25)
 # What the room predicts everywhere [K above ambient].
 PREDICTED_K = 4.0
 DEPARTURE_K = 0.2
+# The share of it that is expected to be wrong.
+WRONG = 0.18
 
 
 def data(
@@ -39,10 +41,14 @@ def plane(excess_k: float) -> PlaneData:
     return PlaneData("x_min", Y, Z, temperature, np.zeros((25, 25)), np.zeros((25, 25, 3)))
 
 
-def corrected(seen: Observations, level_std_k: float, unknown_walls: tuple[str, ...] = ()) -> Correction:
+def corrected(
+    seen: Observations, level_std_k: float, unknown_walls: tuple[str, ...] = (), outlet_std_k: float = 0.0
+) -> Correction:
     residual = seen.values()[0] - PREDICTED_K
     room = np.full(VERTICES, PREDICTED_K)
-    return temperature_correction(seen, room, residual, DEPARTURE_K, level_std_k, unknown_walls)
+    return temperature_correction(
+        seen, room, residual, DEPARTURE_K, level_std_k, WRONG, unknown_walls, outlet_std_k
+    )
 
 
 def test_what_leaves_moves_the_level_as_far_as_it_was_open():
@@ -55,6 +61,15 @@ def test_what_leaves_moves_the_level_as_far_as_it_was_open():
     assert np.abs(held.excess_k).max() < 0.1
     assert held.point_k2 > 10 * (0.1 * DEPARTURE_K) ** 2
     assert (free.variance_k2 < 0.02 * free.prior_variance_k2).all()
+
+
+def test_an_outlet_that_may_draw_from_elsewhere_says_less_of_the_level():
+    seen = data(leaving_k=PREDICTED_K + 0.3)
+    near, elsewhere = corrected(seen, 0.3), corrected(seen, 0.3, outlet_std_k=0.6)
+
+    assert elsewhere.excess_k.mean() < 0.4 * near.excess_k.mean()
+    # An outlet's 0.6 K beside a level known to 0.3 K: 0.27 K are left.
+    np.testing.assert_allclose(np.sqrt(elsewhere.variance_k2), 0.27, atol=0.03)
 
 
 def test_a_plane_says_less_of_the_level_where_its_walls_layer_is_unknown():
