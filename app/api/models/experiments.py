@@ -69,7 +69,7 @@ class NewExperiment(WireModel):
 
 
 # Column and row, in a request.
-Corner = Annotated[list[float], Field(min_length=2, max_length=2)]
+Corner = Annotated[list[Annotated[float, Field(ge=0, le=100_000)]], Field(min_length=2, max_length=2)]
 
 
 class MarksModel(WireModel):
