@@ -47,7 +47,7 @@ COMMANDS = {
     ),
     "import": (
         "app.commands.importing",
-        "Make captures of pictures that another camera took: TIFF, PNG, JPEG, or a camera's raw files.",
+        "Make captures of pictures that another camera took: TIFF, PNG, JPEG, or raw files (by airlens[raw]).",
     ),
     "reconstruct": (
         "app.commands.reconstruct",

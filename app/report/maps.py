@@ -23,6 +23,7 @@ from core.field_samples import samples
 from core.result import Derived, Solution
 from core.scene import Scene
 from core.setting import SettingError
+from core.ventilation.face_flow import SLOWEST_S
 
 # Draws of a place, a power of two; samples of the whole flow for the age.
 _DRAWS_LOG2, _FLOWS = 6, 16
@@ -117,7 +118,14 @@ def _age(solution: Solution, scene: Scene) -> tuple[Volume, Volume | None, Volum
     length_m = LENGTH_SHARE * float(np.prod(scene.room.size_m)) ** (1 / 3)
     coarse = minutes(solution, SAMPLE_CELLS)
     still = replace(solution, temperature_std_k=None)
-    ratios = [minutes(air, SAMPLE_CELLS) / coarse for air in samples(still, _FLOWS, length_m)]
+
+    def sampled(air: Solution) -> Volume:
+        try:
+            return minutes(air, SAMPLE_CELLS)
+        except SettingError:  # a sample that hardly changes the air: as old as air can be told
+            return np.full(found.shape, SLOWEST_S / 60.0)
+
+    ratios = [sampled(air) / coarse for air in samples(still, _FLOWS, length_m)]
     low, high = ends(np.ones_like(found), np.stack(ratios))
     return found, *_bounded("age", found * low, found * high)
 

@@ -324,7 +324,7 @@ def test_pointing_a_link_and_a_film(station: Station, opens: Opens):
     box = place.bounding_box()
     page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
     expect(place.locator(".over")).to_contain_text(re.compile(r"°C, ± 0\.196 \(95 %\); speed \d"))
-    expect(place).to_contain_text("camera, 31 m from the wall")
+    expect(place).to_contain_text("camera, 4.0 m from the wall")
     usual = place.screenshot()
     page.get_by_label("Streamlines").uncheck()
     page.get_by_role("button", name="Side", exact=True).click()

@@ -370,8 +370,18 @@ class Screen:
         os.close(slave)
         self.shown = ""
 
-    def await_text(self, text: str) -> None:
-        until_s = time.monotonic() + 100
+    def interrupt(self, until: str) -> None:
+        """Ctrl-C, and again where the first came just before the program began to read."""
+        for _ in range(5):
+            self.process.send_signal(signal.SIGINT)
+            try:
+                return self.await_text(until, within_s=20)
+            except AssertionError:
+                continue
+        raise AssertionError(self.shown)
+
+    def await_text(self, text: str, within_s: float = 100) -> None:
+        until_s = time.monotonic() + within_s
         while text not in self.shown and time.monotonic() < until_s:
             if select.select([self.master], [], [], 0.2)[0]:
                 self.shown += os.read(self.master, 4096).decode()
@@ -392,8 +402,7 @@ def test_at_a_terminal_questions_show_their_options_and_defaults_and_ctrl_c_keep
     screen.type("", "Length along x [4.1 m]: ")
     screen.type("4100 m", "millimetres")
     screen.type("4.1", "Depth along y [3 m]: ")
-    screen.process.send_signal(signal.SIGINT)
-    screen.await_text("goes on there")
+    screen.interrupt("goes on there")
     assert screen.process.wait(60) == 130
     os.close(screen.master)
     screen = Screen(tmp_path, "lab")

@@ -11,6 +11,7 @@ from app.report.export import _write_csv
 from app.report.maps import derived_maps, ends
 from core.comfort import draught_rate_percent
 from core.result import Derived
+from core.scene import Inlet, Outlet, Patch
 from tests.app.report.test_indoor import PLUG_ROOM, layered
 
 
@@ -52,6 +53,20 @@ def test_the_age_in_a_plug_grows_with_the_way(maps):
     inner = (x_m > 0.3) & (x_m < 3.7)
     # Upwind cells are half a cell too old, 0.1 m of 20 cells, and eddies spread a little.
     np.testing.assert_allclose(age_s[inner], x_m[inner] / 0.1, atol=2.5)
+
+
+def test_an_age_of_which_hardly_anything_is_known_is_there_with_its_interval():
+    supply, exhaust = (
+        Patch(wall=wall, lower_m=(at_m, at_m), upper_m=(at_m + 0.3, at_m + 0.3))
+        for wall, at_m in (("x_min", 0.05), ("x_max", 1.65))
+    )
+    openings = Inlet(patch=supply, temperature_k=290.0, velocity_m_s=(0.1, 0.0, 0.0)), Outlet(patch=exhaust)
+    # 0.1 m/s known to 0.3 m/s: in two of 16 samples air leaves by both openings, and nothing is changed.
+    found = derived_maps(layered(deviation=0.3), replace(PLUG_ROOM, boundary=openings))
+    (age,) = (one for one in found if one.name == "age")
+
+    assert (age.low <= age.values + 1e-9).all()
+    assert age.high.min() > 100 * age.values.max()
 
 
 def test_without_velocity_there_are_no_maps():
