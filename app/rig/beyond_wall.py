@@ -15,7 +15,7 @@ from core.geometry import WALLS, Box, Optics, crop
 from core.plan.print_choice import suited_print
 from core.rays.visibility import sees_wall
 from core.render import render_flow, render_reference
-from core.scene import Scene
+from core.scene import FixedTexture, Scene
 
 Picture = Float32[np.ndarray, "rows cols"]
 Strip = tuple[slice, slice]
@@ -42,11 +42,7 @@ def in_room(image: Picture, scene: Scene, view: int, focal_px: float, field: Abs
     """The picture with the textured walls beside the one that the view looks at, through the same air."""
     shown, beyond = image.copy(), image == 0
     eye = scene.views[view]
-    print_ = suited_print(
-        replace(eye.camera, focal_px=(focal_px, focal_px)),
-        scene.room.upper_m[1] - eye.camera.position_m[1],
-        0,
-    )
+    print_ = _print(scene, view, focal_px, 0)
     for strip in _strips_around(~beyond):
         for number, wall in enumerate(one for one in WALLS if one[0] != "y"):
             pattern = replace(print_.pattern, seed=_SIDES_SEED + number)
@@ -93,19 +89,24 @@ def _wide(scene: Scene, view: int, focal_px: float, seed: int, coarser: float = 
     room, reach_m = scene.room, 0.1 * max(scene.room.size_m)
     (x0, y0, z0), (x1, y1, z1) = room.lower_m, room.upper_m
     wide = Box(lower_m=(x0 - reach_m, y0, z0 - reach_m), upper_m=(x1 + reach_m, y1, z1 + reach_m))
-    camera = replace(scene.views[view].camera, focal_px=(focal_px, focal_px))
-    print_ = suited_print(camera, y1 - camera.position_m[1], seed)
+    print_ = _print(scene, view, focal_px, seed)
     return replace(scene, room=wide, light=replace(print_, pixel_m=coarser * print_.pixel_m), objects=())
 
 
-def _strip(scene: Scene, view: int, camera: Optics, strip: tuple[slice, slice]) -> Picture:
+def _print(scene: Scene, view: int, focal_px: float, seed: int) -> FixedTexture:
+    """A print on the back wall that suits the view's camera with a lens of this focal length."""
+    camera = replace(scene.views[view].camera, focal_px=(focal_px, focal_px))
+    return suited_print(camera, scene.room.upper_m[1] - camera.position_m[1], seed)
+
+
+def _strip(scene: Scene, view: int, camera: Optics, strip: Strip) -> Picture:
     """Rows and columns of what this camera sees through still air."""
     part = replace(scene.views[view], camera=crop(camera, *strip), marks=())
     views = tuple(part if i == view else v for i, v in enumerate(scene.views))
     return render_reference(replace(scene, views=views), view)
 
 
-def _strips_around(inside: np.ndarray) -> list[tuple[slice, slice]]:
+def _strips_around(inside: np.ndarray) -> list[Strip]:
     """The four strips (rows, columns) around the bounding box of what is inside."""
     rows, cols = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
     if not len(rows):

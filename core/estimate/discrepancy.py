@@ -8,9 +8,9 @@ level (the mean). Images do not see the level; thermometers do (a plane, outlets
 of unknown temperature lies in that wall's thermal layer, which the model may have wrong by one constant: that
 constant is estimated too. Walls of stated temperature keep it. The velocity is not corrected.
 
-The size of the correction, and the error of images and planes beyond their noise, are those under which the
-residual is most likely (maximum marginal likelihood): a room that the data contradict is corrected further, and
-is less certain, than one that they confirm.
+How large the correction may be follows from the residual itself, by its marginal likelihood: a room that the data
+contradict is corrected further, and is less certain, than one that they confirm. The error of images and planes
+beyond their noise is found with it.
 """
 
 from collections.abc import Callable, Collection
@@ -24,7 +24,7 @@ from scipy.linalg import block_diag
 from scipy.optimize import minimize
 
 from core.estimate.least_squares import spread
-from core.estimate.observation import IMAGES, OUTLETS, PLANES, Observations, ShiftBlocks
+from core.estimate.observation import IMAGES, OUTLETS, PLANES, SENSORS, Observations, ShiftBlocks
 from core.geometry import face_of
 from core.room.vertices import linear_matrix
 
@@ -37,8 +37,8 @@ _LATTICE = (9, 11)
 _LENGTH_SHARE = 0.2
 # Of K's variance: errors of the profile over height, and local errors.
 _PROFILE_PART, _LOCAL_PART = 0.7, 0.3
-# Share of the variance that the mean along y keeps, of an error as short along y as along x and z: the mean of
-# exp(-|a - b| / l) over a and b from 0 to 1.
+# An error of T is taken to be as short along y as along x and z. Its mean along y keeps this share of its variance:
+# the mean of exp(-|a - b| / l) over a and b from 0 to 1, with l the correlation length.
 _SEEN_SHARE = 2 * _LENGTH_SHARE - 2 * _LENGTH_SHARE**2 * (1 - np.exp(-1 / _LENGTH_SHARE))
 # Standard deviation of the layer of a plane on a wall of unknown temperature, as a share of the rms departure of T
 # from its mean at each height.
@@ -133,13 +133,13 @@ def _kinds(
     for g, design in (
         (IMAGES, _shift_design(data, excess_k, basis)),
         (PLANES, _plane_design(data, excess_k, basis)),
-        (2, _sensor_design(data)),
+        (SENSORS, _sensor_design(data)),
         (OUTLETS, _outlet_design(data)),
     ):
         own = group == g
         if own.any():
             extra = _layer_design(data, unknown_walls) if g == PLANES else np.zeros((len(design), layers))
-            # The square root of the noise keeps the search's start above zero where a room fits exactly.
+            # A hundredth of the noise at least: the search begins above zero where a room fits exactly.
             least = 0.01 * float(np.sqrt(np.median(variance[own])))
             start = max(0.5 * spread(residual[own]), least) if g in (IMAGES, PLANES) else None
             noise = variance[own] + (outlet_std_k**2 if g == OUTLETS else 0.0)

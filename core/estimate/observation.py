@@ -26,9 +26,8 @@ from core.scene import Outlet, Scene
 from core.view_frame import facing
 
 _BLOCKS_ACROSS = 28
-# Kinds of data in `Observations.values` whose neighbours have correlated errors.
-IMAGES, PLANES = 0, 1
-OUTLETS = 4
+# Kinds of data in `Observations.values`. Neighbours of the first two have correlated errors; 3 are sensors of u.
+IMAGES, PLANES, SENSORS, OUTLETS = 0, 1, 2, 4
 
 
 class ShiftBlocks(eqx.Module):

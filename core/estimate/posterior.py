@@ -17,7 +17,6 @@ from core.estimate.temperature_nudging import (
     free_vertices,
     last_correction,
     layer_means,
-    outlets_apart_k,
     without_nudging,
 )
 from core.estimate.uncertainty import Deviation, Represented, deviation
@@ -42,6 +41,7 @@ class Analysis(eqx.Module):
     prior's spread.
     `coarse`, `first` (on the fine grid) and `other` (another closure) are under the same parameters. `before` is the
     run under the fitted parameters; `best` is the same run held at the measured level, or profile, of T.
+    `outlet_std_k` is how far what leaves may be from the air at the outlets' height.
     """
 
     problem: Problem
@@ -57,6 +57,7 @@ class Analysis(eqx.Module):
     before: ForwardRun
     best: ForwardRun
     layout: RoomLayout
+    outlet_std_k: float
 
 
 def solution(
@@ -67,9 +68,9 @@ def solution(
     local_k = departure(best.fields.excess_k)
     free = free_vertices(analysis.layout, best.fields.excess_k.shape)
     start = without_nudging(best.fields, analysis.before.fields, analysis.data, analysis.prior, free)
-    pairs = (analysis.other, analysis.coarse), (analysis.stated_room, analysis.before.fields)
-    outlets_k = outlets_apart_k(analysis.data, pairs)
-    change = last_correction(analysis.data, analysis.prior, analysis.derivatives, start, outlets_k)
+    change = last_correction(
+        analysis.data, analysis.prior, analysis.derivatives, start, analysis.outlet_std_k
+    )
     x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(start.excess_k.shape))
     excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
     moved_k = float(layer_means(excess - analysis.before.fields.excess_k).mean())

@@ -81,12 +81,15 @@ def last_correction(
 
 
 def outlets_apart_k(data: Observations, pairs: Iterable[tuple[RoomFields, RoomFields]]) -> float:
-    """How far the outlets' air may be from the air at their height: what each pair of rooms differs by, added up.
+    """How far what leaves may be from the air at the outlets' height, one standard deviation; 0 without outlets.
 
-    An outlet may draw from a jet or a plume beside it, and which one does is where models differ.
+    An outlet may draw from a jet or a plume beside it. Models differ in that about as much as each is wrong: the
+    variances are what each pair of rooms differs by, as a mean over the outlets.
     """
+    if not data.outlets:
+        return 0.0
     apart = [_from_height_k(data, one) - _from_height_k(data, other) for one, other in pairs]
-    return float(np.sqrt(np.mean(np.square(apart)) * len(apart))) if data.outlets and apart else 0.0
+    return float(np.sqrt(sum(np.mean(np.square(difference)) for difference in apart)))
 
 
 def _from_height_k(data: Observations, room: RoomFields) -> Float[np.ndarray, " outlets"]:

@@ -142,17 +142,16 @@ def fitted_room(
     else:
         found = fine_fit(fine, prior, data, vector, first, linearised, settings, marches)
     before = best = found.room
+    stated = background.first.fields
+    outlet_std_k = outlets_apart_k(data, ((other, linearised.start), (stated, before.fields)))
     if settings.use_images:
-        outlets_k = outlets_apart_k(
-            data, ((other, linearised.start), (background.first.fields, before.fields))
-        )
-        best = held_fit(fine, prior, data, before, derivatives, settings, marches, outlets_k)
+        best = held_fit(fine, prior, data, before, derivatives, settings, marches, outlet_std_k)
     return Analysis(
         background.problem,
         data,
         prior,
         found.posterior,
-        background.first.fields,
+        stated,
         derivatives,
         derivatives,
         coarse=linearised.start,
@@ -161,6 +160,7 @@ def fitted_room(
         before=before,
         best=best,
         layout=fine.layout,
+        outlet_std_k=outlet_std_k,
     )
 
 
@@ -174,21 +174,23 @@ def _by_ensemble(
     doing = "march the coarse room as corrected"
     base = march_under(coarse, parameters, found.flow, settings.restart_s, vertices, marches, doing=doing)
     other = run_under_other_closure(coarse, parameters, base, settings, vertices, marches)
-    outlets_k = outlets_apart_k(data, ((other, base.fields), (background.first.fields, found.room.fields)))
+    stated = background.first.fields
+    outlet_std_k = outlets_apart_k(data, ((other, base.fields), (stated, found.room.fields)))
     return Analysis(
         background.problem,
         data,
         prior,
         found.posterior,
-        background.first.fields,
+        stated,
         found.stated,
         found.derivatives,
         coarse=base.fields,
         first=found.room.fields,
         other=other,
         before=found.room,
-        best=held_fit(fine, prior, data, found.room, found.stated, settings, marches, outlets_k),
+        best=held_fit(fine, prior, data, found.room, found.stated, settings, marches, outlet_std_k),
         layout=fine.layout,
+        outlet_std_k=outlet_std_k,
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 from core.estimate.diagnostics import balances
 from core.estimate.observation import observations
 from core.estimate.prior import Prior, room_prior
-from core.estimate.temperature_nudging import without_nudging
+from core.estimate.temperature_nudging import outlets_apart_k, without_nudging
 from core.geometry import WALLS, Box, looking_along_y
 from core.problem import Problem
 from core.room.forward import room
@@ -61,6 +61,18 @@ def test_a_room_that_was_held_goes_back_to_its_own_level_and_where_walls_are_unk
     expected = own + (warmer - warmer.mean() if stated else 0.0)
     np.testing.assert_allclose(back.excess_k, expected, atol=1e-9)
     assert back.outflow_excess_k[0] == pytest.approx(5.5 - (0.4 if stated else 0.25))
+
+
+def test_what_leaves_is_as_uncertain_as_rooms_differ_in_drawing_it_from_elsewhere_than_its_height():
+    data = observations(problem(stated=True), VERTICES)
+
+    def drawing(level_k: float, apart_k: float) -> RoomFields:
+        air = np.full(VERTICES, level_k)
+        return RoomFields(air, 0.0 * air, np.zeros((*VERTICES, 3)), np.array([level_k + apart_k]))
+
+    near, beside, far = drawing(5.0, 0.0), drawing(6.0, 0.3), drawing(4.0, -0.4)
+    assert outlets_apart_k(data, [(near, near), (near, drawing(7.0, 0.0))]) == pytest.approx(0.0, abs=1e-9)
+    assert outlets_apart_k(data, [(near, beside), (far, near)]) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(("held_k_m3_s", "said"), [(0.3, "W more"), (-0.3, "W less"), (0.02, None)])
