@@ -17,8 +17,10 @@ _FALSE_ALARMS = 0.05
 _INTERVAL = 1.96
 # Missing heat is reported above this share of the heat that the supplies bring.
 _MISSING_SHARE = 0.1
-# The velocity is called doubtful if more than this share of the shifts (rms) is unexplained.
+# The scene is called incomplete if more than this share of the shifts (rms) is unexplained.
 _POOR_FIT = 0.35
+# The velocity is called doubtful if more than this share of it (rms) is expected to be wrong.
+_DOUBTFUL = 0.5
 # Correlation of the measured shifts with those of the room as stated, below which they went the other way.
 _OTHER_WAY = -0.5
 # A floor panel is reported if it is warmer, or colder, than the air by at least this.
@@ -121,10 +123,22 @@ def misfit(data: Observations, share: float) -> list[str]:
     said = [f"{100 * share:.0f} % (rms) of the measured shifts is left unexplained by the fitted room."]
     if share > _POOR_FIT:
         said.append(
-            "The closure or the stated boundary cannot explain these images: distrust the velocity. Check "
-            "inlets, outlets and heaters for something that is not in the scene."
+            "The closure or the stated boundary cannot explain these images. Check inlets, outlets and heaters for "
+            "something that is not in the scene."
         )
     return said
+
+
+def doubtful(share: float) -> list[str]:
+    """How wrong the velocity is expected to be, over its size (both rms), with a warning if it is much."""
+    much = f"{100 * share:.0f} % of its size (rms)" if share < 1.0 else "its whole size (rms) or more"
+    said = f"The velocity is expected to be wrong by {much}"
+    if share <= _DOUBTFUL:
+        return [f"{said}."]
+    return [
+        f"{said}: distrust the velocity. State what you can of the walls' temperatures and of all else that warms or "
+        "moves the air: it tells more than more pictures do."
+    ]
 
 
 def other_way(likeness: float) -> list[str]:

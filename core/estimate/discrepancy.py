@@ -33,13 +33,13 @@ from core.room.vertices import linear_matrix
 _CORRELATED = 4.0
 # Basis functions along x and z.
 _LATTICE = (9, 11)
-# Correlation length of K, as a share of the room.
-_LENGTH_SHARE = 0.2
+# Correlation length of K and of other errors of the model, as a share of the room.
+LENGTH_SHARE = 0.2
 # Of K's variance: errors of the profile over height, and local errors.
 _PROFILE_PART, _LOCAL_PART = 0.7, 0.3
 # An error of T is taken to be as short along y as along x and z. Its mean along y keeps this share of its variance:
 # the mean of exp(-|a - b| / l) over a and b from 0 to 1, with l the correlation length.
-_SEEN_SHARE = 2 * _LENGTH_SHARE - 2 * _LENGTH_SHARE**2 * (1 - np.exp(-1 / _LENGTH_SHARE))
+_SEEN_SHARE = 2 * LENGTH_SHARE - 2 * LENGTH_SHARE**2 * (1 - np.exp(-1 / LENGTH_SHARE))
 # Standard deviation of the layer of a plane on a wall of unknown temperature, as a share of the rms departure of T
 # from its mean at each height.
 _LAYER_SHARE = 1.0
@@ -213,8 +213,8 @@ def _layer_design(data: Observations, unknown_walls: Collection[str]) -> Float[n
 def _prior_k2(std_k: float) -> Float[np.ndarray, "lattice lattice"]:
     """Covariance K without its level: 0.7 of it depends on height alone, 0.3 is local."""
     x, z = (np.linspace(0, 1, m) for m in _LATTICE)
-    near_x = np.exp(-np.abs(x[:, None] - x[None, :]) / _LENGTH_SHARE)
-    near_z = np.exp(-np.abs(z[:, None] - z[None, :]) / _LENGTH_SHARE)
+    near_x = np.exp(-np.abs(x[:, None] - x[None, :]) / LENGTH_SHARE)
+    near_z = np.exp(-np.abs(z[:, None] - z[None, :]) / LENGTH_SHARE)
     size = len(x) * len(z)
     kernel = _PROFILE_PART * np.ones_like(near_x)[:, None, :, None] + _LOCAL_PART * near_x[:, None, :, None]
     covariance = (kernel * near_z[None, :, None, :]).reshape(size, size)

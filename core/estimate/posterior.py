@@ -6,32 +6,35 @@ from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
 
 from core.air import GRAVITY_M_S2
-from core.estimate.diagnostics import balances, contradictions, misfit, other_way, undetermined
-from core.estimate.explained import Explained, explained, likeness
+from core.estimate.diagnostics import (
+    balances,
+    contradictions,
+    doubtful,
+    misfit,
+    other_way,
+    undetermined,
+)
+from core.estimate.explained import explained, likeness
 from core.estimate.forward_runs import Derivatives, ForwardRun
 from core.estimate.least_squares import Posterior
+from core.estimate.model_error import ModelError, model_error
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior
 from core.estimate.temperature_nudging import (
-    departure,
     free_vertices,
     last_correction,
     layer_means,
     without_nudging,
 )
-from core.estimate.uncertainty import Deviation, Represented, deviation
+from core.estimate.uncertainty import Deviation, deviation
 from core.problem import Problem
 from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
 from core.room.vertices import RoomFields
 
-# Shares a, c and b of `core.estimate.uncertainty`.
-_SHARES = {"excess_k": (0.1, 0.3, 0.0), "pressure_m2_s2": (0.3, 1.0, 1.0), "velocity_m_s": (0.2, 5.0, 0.3)}
 # If the thermometers moved the level of T, half of that move is added to its standard deviation: they stand in a few
 # places, and the model was wrong there.
 _DOUBT = 0.5
-# Factors on c where one viscosity was guessed for all air: a map of it that explains the images may still be wrong.
-_GUESSED_VISCOSITY = {"excess_k": 20.0, "pressure_m2_s2": 1.0, "velocity_m_s": 2.0}
 
 
 class Analysis(eqx.Module):
@@ -65,7 +68,6 @@ def solution(
 ) -> Solution:
     """The result: fields, standard deviations, and sentences after `notes`; T with its last correction."""
     best, box, problem = analysis.best, analysis.problem.scene.room, analysis.problem
-    local_k = departure(best.fields.excess_k)
     free = free_vertices(analysis.layout, best.fields.excess_k.shape)
     start = without_nudging(best.fields, analysis.before.fields, analysis.data, analysis.prior, free)
     change = last_correction(
@@ -78,10 +80,12 @@ def solution(
     before, after = ((v[:, None, :] + (_DOUBT * moved_k) ** 2) * free for v in variances)
     bent = hydrostatic_variance_m4_s4(problem, z, before), hydrostatic_variance_m4_s4(problem, z, after)
     of_points = change.point_k2 * free
-    seen = explained(analysis.data, best.fields)
-    temperature = _deviation(analysis, "excess_k", local_k, seen, (before + of_points, after + of_points))
-    pressure = _deviation(analysis, "pressure_m2_s2", departure(best.fields.pressure_m2_s2), seen, bent)
-    velocity = _deviation(analysis, "velocity_m_s", rms(best.fields.velocity_m_s), seen)
+    error = model_error_of(analysis)
+    # The correction holds what the model has wrong in T.
+    temperature = _deviation(analysis, "excess_k", None, (before + of_points, after + of_points))
+    pressure = _deviation(analysis, "pressure_m2_s2", error, bent)
+    velocity = _deviation(analysis, "velocity_m_s", error)
+    doubt = rms(velocity.std) / max(rms(best.fields.velocity_m_s), float(np.finfo(np.float32).tiny))
     return Solution(
         x,
         y,
@@ -95,32 +99,29 @@ def solution(
         temperature.informed,
         outcome=best.flow.outcome,
         solver_s=seconds,
-        notes=(*notes, *sentences(analysis, seen)),
+        notes=(*notes, *sentences(analysis, error, doubt)),
     )
 
 
-def sentences(analysis: Analysis, seen: Explained) -> list[str]:
-    """Sentences for the operator; `seen` is what the room explains of the images."""
+def sentences(analysis: Analysis, error: ModelError, doubt: float) -> list[str]:
+    """Sentences for the operator; `doubt` is the expected error of the velocity over its size, both rms."""
     parameters = analysis.best.parameters
     inflow = np.asarray(analysis.layout.inflow_m3_s(parameters), float)
     return [
         *analysis.layout.notes,
         *undetermined(analysis.problem),
-        *contradictions(analysis.problem, analysis.prior, analysis.posterior, moved_by_closure(analysis)),
-        *misfit(analysis.data, seen.share_left),
+        *contradictions(analysis.problem, analysis.prior, analysis.posterior, np.abs(error.moved[0])),
+        *misfit(analysis.data, explained(analysis.data, analysis.best.fields).share_left),
+        *doubtful(doubt),
         *other_way(likeness(analysis.data, analysis.stated_room)),
         *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, held_k_m3_s(analysis)),
     ]
 
 
-def moved_by_closure(analysis: Analysis) -> Float[np.ndarray, " active"]:
-    """How far each parameter would move, in prior deviations, were the air that of the other closure."""
-    if not len(analysis.posterior.deviation):
-        return np.zeros(len(analysis.posterior.vector))
-    jacobian = analysis.derivatives.per_deviation(analysis.data.predicted).T
-    other, own = (analysis.data.predicted(fields) for fields in (analysis.other, analysis.coarse))
-    weighted = jacobian.T / analysis.posterior.deviation**2
-    return np.abs(analysis.posterior.covariance @ weighted @ (other - own))
+def model_error_of(analysis: Analysis) -> ModelError:
+    """What the model of the air has wrong: first as two closures differ, then as two grids do."""
+    pairs = (analysis.coarse, analysis.other), (analysis.coarse, analysis.first)
+    return model_error(analysis.data, analysis.posterior, analysis.derivatives, pairs, analysis.best.fields)
 
 
 def outflow_excess_k(analysis: Analysis) -> float:
@@ -160,26 +161,11 @@ def rms(field: Float[np.ndarray, "..."]) -> float:
 def _deviation(
     analysis: Analysis,
     name: str,
-    scale: float,
-    seen: Explained,
+    error: ModelError | None,
     extra: tuple[np.ndarray | float, np.ndarray | float] = (0.0, 0.0),
 ) -> Deviation:
     stated, moved = (
         of.per_deviation(lambda run: getattr(run, name)) for of in (analysis.stated, analysis.derivatives)
     )
-    between = [
-        getattr(run, name) - getattr(analysis.coarse, name) for run in (analysis.first, analysis.other)
-    ]
-    if between[1].ndim == 3:
-        # Closures pass walls' heat differently; the level that follows is measured.
-        between[1] = between[1] - between[1].mean((0, 1))
-        if analysis.data.planes:
-            # The plane measures the profile over height; only departures from it are errors of the grid.
-            between[0] = between[0] - between[0].mean((0, 1))
-    a, c, b = _SHARES[name]
-    if float(analysis.prior.std.log_viscosity.max()) > 0:
-        c *= _GUESSED_VISCOSITY[name]
-    # Over the room's own signal: a room that lacks a heater is small where it is wrong.
-    shares = (a, c * seen.share_left, b * seen.left_over_own)
-    represented = Represented(between[0], between[1], scale, shares)
-    return deviation(stated, moved, analysis.posterior.covariance, represented, extra)
+    model_std = error.deviation(name, moved) if error else 0.0
+    return deviation(stated, moved, analysis.posterior.covariance, model_std, extra)

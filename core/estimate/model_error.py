@@ -1,0 +1,99 @@
+"""How wrong the model of the air is, by place: in units of what two closures, and two grids, differ in.
+
+    std^2 = nu / (nu - 2)  k^2  sum over pairs <d^2>,   d = (f_other - f) - D m,   m = C J^T R^-1 (s_other - s)
+
+f is a field and s what the data would show of it, under one closure and another, or on two grids; m is how far the
+parameters would move if the data were the other model's, D and J the derivatives of f and s in them. So d is what the
+fit could not take up. <> is a mean over a correlation length. k is the ratio of what the fitted room leaves of the
+images, beyond their noise, to what d would leave: expected to be 1, known within a factor e, and moved by the
+likelihood. Where the images do not tell two models apart it stays 1.
+
+d at a point is one draw of three components. An error whose variance is known from three squares has Student's t
+distribution with nu = 3 (Gosset, Biometrika 6 (1908)), whose standard deviation is sqrt(3) times as large.
+"""
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float
+from scipy import ndimage
+from scipy.optimize import minimize_scalar
+
+from core.data_error import CORRELATED_DATA
+from core.estimate.discrepancy import LENGTH_SHARE
+from core.estimate.forward_runs import Derivatives
+from core.estimate.least_squares import Posterior
+from core.estimate.observation import IMAGES, Observations
+from core.room.vertices import RoomFields
+
+Pair = tuple[RoomFields, RoomFields]
+
+_STUDENT = 3.0
+# Of the logarithm of k: within e^4 either way.
+_FARTHEST = 4.0
+
+
+class ModelError(eqx.Module):
+    """Pairs of rooms that differ in the model alone, how each would move the parameters, and the size k.
+
+    `moved` is in prior deviations.
+    """
+
+    pairs: tuple[Pair, ...]
+    moved: Float[np.ndarray, "pairs active"]
+    size: float
+
+    def deviation(
+        self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]
+    ) -> Float[np.ndarray, "vx vy vz ..."]:
+        """One standard deviation of the field of this name; `derivatives` are its own, per prior deviation."""
+        variance = np.zeros(getattr(self.pairs[0][0], name).shape)
+        for (one, other), moved in zip(self.pairs, self.moved, strict=True):
+            apart = getattr(other, name) - getattr(one, name) - np.tensordot(moved, derivatives, axes=1)
+            if apart.ndim == 3:
+                # The mean of p at each height follows that of T, of which the last correction knows more.
+                apart = apart - apart.mean((0, 1))
+            # A mean over one correlation length: one standard deviation to each side.
+            width = [0.5 * LENGTH_SHARE * n for n in apart.shape[:3]] + [0.0] * (apart.ndim - 3)
+            variance += ndimage.gaussian_filter(apart**2, width)
+        return self.size * np.sqrt(_STUDENT / (_STUDENT - 2.0) * variance)
+
+
+def model_error(
+    data: Observations,
+    posterior: Posterior,
+    derivatives: Derivatives,
+    pairs: tuple[Pair, ...],
+    found: RoomFields,
+) -> ModelError:
+    """The error of the model that ended in the room `found`."""
+    jacobian = derivatives.per_deviation(data.predicted).T
+    shown = [data.predicted(other) - data.predicted(one) for one, other in pairs]
+    if len(posterior.deviation):
+        weighted = jacobian.T / posterior.deviation**2
+        moved = np.stack([posterior.covariance @ weighted @ apart for apart in shown])
+    else:
+        moved = np.zeros((len(pairs), len(posterior.vector)))
+    values, noise, group = data.values()
+    images = group == IMAGES
+    left = (values - data.predicted(found))[images]
+    apart = np.stack([s - jacobian @ m for s, m in zip(shown, moved, strict=True)])[:, images]
+    return ModelError(pairs, moved, size_of(left, noise[images], apart))
+
+
+def size_of(
+    left: Float[np.ndarray, " data"],
+    noise: Float[np.ndarray, " data"],
+    apart: Float[np.ndarray, "pairs data"],
+) -> float:
+    """The likeliest k, from what a room leaves of the images and their noise's variance; 1 without images."""
+    if not len(left):
+        return 1.0
+    independent = len(left) / CORRELATED_DATA
+    power, noise_power, unit = np.mean(left**2), np.mean(noise), np.mean(np.sum(apart**2, axis=0))
+
+    def unlikely(log_size: float) -> float:
+        variance = noise_power + np.exp(2.0 * log_size) * unit
+        return float(0.5 * independent * (np.log(variance) + power / variance) + 0.5 * log_size**2)
+
+    found = minimize_scalar(unlikely, bounds=(-_FARTHEST, _FARTHEST), method="bounded")
+    return float(np.exp(found.x))

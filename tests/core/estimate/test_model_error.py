@@ -1,0 +1,104 @@
+"""The model's error: k by likelihood, what the fit takes up of it, and its standard deviation by place."""
+
+import numpy as np
+import pytest
+
+from core.data_error import CORRELATED_DATA
+from core.estimate.diagnostics import doubtful
+from core.estimate.forward_runs import Derivatives
+from core.estimate.least_squares import Posterior
+from core.estimate.model_error import ModelError, model_error, size_of
+from core.estimate.observation import observations
+from core.problem import Problem
+from core.room.vertices import RoomFields
+from tests.core.estimate.test_explained import VERTICES, room_of, seen
+
+SHAPE = (24, 20, 22)
+
+
+def still(velocity_m_s: np.ndarray) -> RoomFields:
+    nothing = np.zeros(velocity_m_s.shape[:3])
+    return RoomFields(nothing, nothing, velocity_m_s, np.zeros(1))
+
+
+@pytest.mark.parametrize("true_size", [0.1, 1.0, 8.0])
+def test_the_size_is_that_of_what_is_left_beyond_the_noise(true_size: float):
+    draw = np.random.default_rng(3)
+    noise, apart = np.full(40_000, 0.05**2), draw.normal(size=(2, 40_000))
+    left = true_size * 2**0.5 * draw.normal(size=40_000) + 0.05 * draw.normal(size=40_000)
+
+    assert size_of(left, noise, apart) == pytest.approx(true_size, rel=0.02)
+
+
+def test_without_a_word_of_the_images_the_size_is_one():
+    draw = np.random.default_rng(4)
+    noise = draw.normal(size=int(CORRELATED_DATA) * 200)
+
+    assert size_of(np.zeros(0), np.zeros(0), np.zeros((1, 0))) == 1.0
+    # Two models that the images do not tell apart.
+    assert size_of(noise, np.ones(len(noise)), np.full((1, len(noise)), 1e-6)) == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_model_that_explains_the_images_is_believed_more_than_one_that_does_not():
+    data = observations(seen(4.0, 0.02), VERTICES)
+    posterior = Posterior(np.zeros(0), np.zeros((0, 0)), np.zeros(0))
+    own = room_of(4.0)
+    pair = (own, replace_excess(own, room_of(5.0)))
+    nothing = Derivatives(own, [], np.zeros((0, 0)))
+
+    right, wrong = (
+        model_error(data, posterior, nothing, (pair,), room_of(found_k)).size for found_k in (4.0, 2.0)
+    )
+
+    # Half of 4 K is left, where the two models differ by 1 K; these few windows move k a part of the way.
+    assert right < 0.6
+    assert 1.4 < wrong < 2.0
+
+
+def replace_excess(room: RoomFields, other: RoomFields) -> RoomFields:
+    return RoomFields(other.excess_k, room.pressure_m2_s2, room.velocity_m_s, room.outflow_excess_k)
+
+
+def test_what_the_fit_takes_up_is_no_error():
+    given = seen(4.0, 0.02)
+    data = observations(Problem(given.scene, given.shifts), VERTICES)
+    own = room_of(4.0)
+    faster = RoomFields(
+        room_of(5.0).excess_k, own.pressure_m2_s2, own.velocity_m_s + 0.3, own.outflow_excess_k
+    )
+    # One parameter does to the room what the other closure does.
+    derivatives = Derivatives(own, [faster], np.eye(1))
+    known = Posterior(np.zeros(1), 1e-6 * np.eye(1), np.full(len(data.values()[0]), 1.0))
+    jacobian = derivatives.per_deviation(data.predicted).T
+    exact = np.linalg.inv(jacobian.T @ jacobian)
+
+    taken = model_error(data, replace_covariance(known, exact), derivatives, ((own, faster),), own)
+    left = model_error(data, known, derivatives, ((own, faster),), own)
+
+    assert taken.moved[0, 0] == pytest.approx(1.0, abs=1e-6)
+    slopes = derivatives.per_deviation(lambda run: run.velocity_m_s)
+    assert taken.deviation("velocity_m_s", slopes).max() < 1e-5
+    assert left.deviation("velocity_m_s", slopes).min() > 0.02
+
+
+def replace_covariance(posterior: Posterior, covariance: np.ndarray) -> Posterior:
+    return Posterior(posterior.vector, covariance, posterior.deviation)
+
+
+def test_intervals_hold_errors_of_the_kind_that_they_are_made_from():
+    draw = np.random.default_rng(5)
+    one, error = (0.1 * draw.normal(size=(*SHAPE, 3)) for _ in range(2))
+    apart = ModelError(((still(np.zeros((*SHAPE, 3))), still(one)),), np.zeros((1, 0)), 1.0)
+
+    std = apart.deviation("velocity_m_s", np.zeros((0, *SHAPE, 3)))
+
+    assert np.mean(np.abs(error) < 1.96 * std) > 0.95
+    # Twice the size, twice the error.
+    double = ModelError(apart.pairs, apart.moved, 2.0)
+    np.testing.assert_allclose(double.deviation("velocity_m_s", np.zeros((0, *SHAPE, 3))), 2 * std, rtol=1e-6)
+
+
+def test_a_velocity_of_which_half_may_be_wrong_is_not_to_be_believed():
+    assert doubtful(0.24) == ["The velocity is expected to be wrong by 24 % of its size (rms)."]
+    assert "distrust the velocity" in " ".join(doubtful(0.51))
+    assert "its whole size" in doubtful(3.2)[0]
