@@ -15,6 +15,7 @@ from core.displacement import window_centres
 from core.rays.visibility import sees_wall
 from core.render import pixel_renderer
 from core.scene import Scene
+from core.window_fit import derivative_filter
 
 # Pixels compared in each window: evenly spaced.
 _ACROSS = 10
@@ -49,6 +50,15 @@ def covered_windows(
     sums[:, tested] = _sums(scene, view, reference, centres[tested], window_px)
     on_wall, sums = tested.reshape(rows, columns), sums.reshape(6, rows, columns)
     return (_covered(sums, on_wall, _windows_across(window_px)) & on_wall).ravel()
+
+
+def reached_from(
+    covered: Bool[np.ndarray, " windows"], shape: tuple[int, int], window_px: int
+) -> Bool[np.ndarray, " windows"]:
+    """The covered windows of a picture of `shape`, and those whose gradient reaches into one of them."""
+    across = 2 * -(-(len(derivative_filter()) // 2) // window_px) + 1
+    grid = covered.reshape([n // window_px for n in shape])
+    return np.asarray(ndimage.binary_dilation(grid, np.ones((across, across))), bool).ravel()
 
 
 def _windows_across(window_px: int) -> int:

@@ -11,6 +11,7 @@ from app.errors import BadInputError
 from app.experiment.captures import Capture, CapturePair
 from app.experiment.found import Found
 from app.reconstruct.bursts import burst_shifts, windows_among
+from app.reconstruct.cover import reached_from
 from app.reconstruct.drift import Agreement, agreement, mount, without_known_drift
 from app.reconstruct.found import what_stands
 from app.reconstruct.pair import check_pair
@@ -112,7 +113,7 @@ def _measure_view(
     shift, drift, note = without_known_drift(
         exposures, in_room, beyond, prior, _marks(view, shape, window_px)
     )
-    return _in_room(shift, in_room, covered, drift, said + note)
+    return _in_room(shift, in_room, covered, shape, drift, said + note)
 
 
 def _wall_and_beyond(scene: Scene, index: int, shape: tuple[int, int], window_px: int) -> tuple[Mask, Mask]:
@@ -190,16 +191,21 @@ def _share(*captures: Capture) -> float:
 
 
 def _in_room(
-    shift: ShiftMeasurement, in_room: np.ndarray, covered: np.ndarray, drift: Similarity, note: str
+    shift: ShiftMeasurement,
+    in_room: np.ndarray,
+    covered: np.ndarray,
+    shape: tuple[int, int],
+    drift: Similarity,
+    note: str,
 ) -> tuple[ShiftMeasurement, Similarity, str]:
     """The good windows that see the room's wall; what was refused is told."""
     hidden = covered[in_room]
     if hidden.any():
         note += (
             f" Something stands before {100 * float(hidden.mean()):.1f} % of the wall: the reference does not show "
-            "the pattern there. These windows are left out."
+            "the pattern there. These windows and those beside them are left out."
         )
-    shift = shift.at(in_room & ~covered)
+    shift = shift.at(in_room & ~reached_from(covered, shape, shift.window_px))
     if shift.refused is not None and np.any(shift.refused):
         refused = float(shift.refused.mean())
         note += (

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import norm
 
+from core.estimate.explained import Explained
 from core.estimate.least_squares import Posterior
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior, looked_through
@@ -116,17 +117,21 @@ def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
     ]
 
 
-def misfit(data: Observations, share: float) -> list[str]:
+def misfit(data: Observations, seen: Explained) -> list[str]:
     """How much of the measured shifts is left unexplained, with a warning if it is much."""
     if not data.shifts:
         return []
-    said = [f"{100 * share:.0f} % (rms) of the measured shifts is left unexplained by the fitted room."]
-    if share > _POOR_FIT:
-        said.append(
-            "The closure or the stated boundary cannot explain these images. Check inlets, outlets and heaters for "
-            "something that is not in the scene."
-        )
-    return said
+    share = seen.share_left
+    said = f"{100 * share:.0f} % (rms) of the measured shifts is left unexplained by the fitted room"
+    if not seen.stands_out:
+        return [f"{said}, no more than their noise may be misjudged by."]
+    if share <= _POOR_FIT:
+        return [f"{said}."]
+    return [
+        f"{said}.",
+        "The closure or the stated boundary cannot explain these images. Check inlets, outlets and heaters for "
+        "something that is not in the scene.",
+    ]
 
 
 def doubtful(share: float) -> list[str]:

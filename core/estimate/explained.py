@@ -8,18 +8,26 @@ from core.room.vertices import RoomFields
 
 # Share left that is assumed where the images do not tell it: there are none, or all that they show may be noise.
 _UNSEEN_SHARE = 0.3
+# A window's stated variance is right within this share: in simulated labs its errors scatter by 0.9 to 1.2 of it.
+_NOISE_KNOWN = 0.2
 
 
 class Explained(eqx.Module):
-    """Rms shifts [px]: the measured signal, what a room predicts of it, and what it leaves.
+    """Rms shifts [px]: the measured signal, what a room predicts of it, what it leaves, and the noise.
 
-    Noise is taken out of the first and of the last. All three hold how well its power is known, so that a picture
+    Noise is taken out of the first and of the third. These three hold how well its power is known, so that a picture
     that shows nothing but noise says nothing against a room.
     """
 
     measured_px: float
     predicted_px: float
     left_px: float
+    noise_px: float
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether what is left is more than the noise may be misjudged by."""
+        return self.left_px**2 > _NOISE_KNOWN * self.noise_px**2
 
     @property
     def share_left(self) -> float:
@@ -37,7 +45,7 @@ def explained(data: Observations, fields: RoomFields) -> Explained:
     values, variance, group = data.values()
     shifts = group == IMAGES
     if not shifts.any():
-        return Explained(1.0, 1.0, _UNSEEN_SHARE)
+        return Explained(1.0, 1.0, _UNSEEN_SHARE, 1.0)
     values, predicted, variance = values[shifts], data.predicted(fields)[shifts], variance[shifts]
     noise = float(variance.sum())
     # One standard deviation of the noise's power.
@@ -51,6 +59,7 @@ def explained(data: Observations, fields: RoomFields) -> Explained:
         rms(max(float(values @ values) - noise, 0.0) + doubt),
         rms(float(predicted @ predicted) + doubt),
         rms(max(float(left @ left) - noise, 0.0) + _UNSEEN_SHARE**2 * doubt),
+        rms(noise),
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.reconstruct.cover import covered_windows
+from app.reconstruct.cover import covered_windows, reached_from
 from app.rig.nuisances import covered, spoiled
 from app.simulate.worlds import LAB
 from app.volume.file import read_volume
@@ -55,3 +55,16 @@ def test_another_pattern_than_the_stated_one_is_no_cover():
     scene, _ = seen("texture")
     _, other = seen("texture", pattern_seed=5)
     assert not covered_windows(scene, 0, noisy(other, 0.0)[0], WINDOW_PX).any()
+
+
+@pytest.mark.parametrize(("window_px", "reach"), [(16, 1), (8, 2)])
+def test_windows_whose_gradient_reaches_into_a_covered_one_are_left_out_with_it(window_px, reach):
+    covered = np.zeros((6, 9), bool)
+    covered[2, 4] = True
+
+    found = reached_from(covered.ravel(), (6 * window_px + 3, 9 * window_px), window_px).reshape(6, 9)
+
+    # The derivative's filter has ten taps on each side.
+    expected = np.zeros_like(covered)
+    expected[max(2 - reach, 0) : 3 + reach, 4 - reach : 5 + reach] = True
+    np.testing.assert_array_equal(found, expected)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.estimate.diagnostics import contradictions, other_way
+from core.estimate.diagnostics import contradictions, misfit, other_way
 from core.estimate.explained import explained, likeness
 from core.estimate.least_squares import Posterior
 from core.estimate.observation import observations
@@ -106,3 +106,13 @@ def test_of_rooms_with_right_entries_one_in_twenty_has_such_a_sentence():
         found = Posterior(vector, 0.01 * np.eye(active), np.zeros(0))
         alarms += bool(contradictions(given, prior, found, by_closure))
     assert 0.01 < alarms / 400 < 0.08
+
+
+@pytest.mark.parametrize(("noise", "doubted"), [(0.1, True), (3.0, False)])
+def test_a_room_is_doubted_for_what_stands_out_of_the_noise_alone(noise, doubted):
+    data = observations(seen(4.0, noise), VERTICES)
+
+    said = " ".join(misfit(data, explained(data, room_of(1.0))))
+
+    assert ("cannot explain these images" in said) == doubted
+    assert ("no more than their noise" in said) != doubted
