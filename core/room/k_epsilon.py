@@ -7,6 +7,10 @@
 Beside walls, y the distance of the first cell's centre: eps = C^(3/4) k^(3/2) / (kappa y) is set,
 G = nu_w |u| / y C^(1/4) sqrt(k) / (kappa y), nu_w = nu y+ kappa / ln(E y+), averaged over the walls that a
 cell touches. Sources are taken implicitly, so both stay positive at any step. First-order upwind.
+
+Where hardly anything feeds turbulence k^2 / eps would grow without end, since eps decays faster than k. So no eddy is
+larger than the log law allows in the middle between two walls: C^(3/4) k^(3/2) / eps <= kappa h / 2, with h the
+room's smallest size.
 """
 
 import equinox as eqx
@@ -75,10 +79,16 @@ def advance(
     frequency = epsilon / k
     new_k = (k + dt_s * (k_rate + production)) / (1.0 + dt_s * frequency)
     new_e = (epsilon + dt_s * (e_rate + C_1 * production * frequency)) / (1.0 + dt_s * C_2 * frequency)
+    new_e = jnp.maximum(new_e, C_MU**0.75 * new_k**1.5 / largest_eddy_m(grid))
     new_e = jnp.where(touched > 0, wall_epsilon, new_e)
     if boundary.solids is not None:
         new_k, new_e = new_k * boundary.solids.air, new_e * boundary.solids.air
     return KEpsilonState(jnp.maximum(new_k, SMALLEST_K), jnp.maximum(new_e, SMALLEST_EPSILON))
+
+
+def largest_eddy_m(grid: RoomGrid) -> float:
+    """The log law's mixing length in the middle between the two walls that are nearest to one another."""
+    return KAPPA * 0.5 * min(n * h for n, h in zip(grid.cells, grid.spacing_m, strict=True))
 
 
 def strain_squared(velocity: Velocity, grid: RoomGrid) -> Cells:
