@@ -57,7 +57,11 @@ class Job:
 
     @property
     def progress(self) -> float:
-        """Between 0 and 1; 0 when the number of steps is not known yet."""
+        """Between 0 and 1; 0 when the number of steps is not known yet. What is done is whole: keeping a result and
+        drawing its report are no steps.
+        """
+        if self.state is JobState.done:
+            return 1.0
         return min(1.0, self.step / self.steps) if self.steps > 0 else 0.0
 
 

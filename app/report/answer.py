@@ -1,11 +1,12 @@
 """The answer of a report: three sentences without jargon, and what would make it surer."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from app.errors import explained
-from app.experiment.found import found_in
+from app.experiment.found import Found, found_in
 from app.report.finding import Finding
 from app.report.indoor import Quantity
 from app.report.indoor import told as line_of
@@ -38,6 +39,12 @@ def summary(finding: Finding) -> tuple[str, ...]:
 def advice(finding: Finding) -> tuple[str, ...]:
     """What to do to know better, the most useful first."""
     return tuple(_advice(finding))
+
+
+def assumed(manifest: Mapping[str, Any]) -> tuple[str, ...]:
+    """What a result took on trust, without what was found before the wall: that has its own place."""
+    elsewhere = {one.sentence for one in found_in(manifest)}
+    return tuple(sentence for sentence in manifest.get("assumed", ()) if sentence not in elsewhere)
 
 
 def _air(finding: Finding) -> str:
@@ -104,7 +111,7 @@ def _advice(finding: Finding) -> Iterable[str]:
     if solution.outcome in (Outcome.step_limit, Outcome.time_limit, Outcome.nonfinite):
         yield f"The solve did not come to its end. {solution.outcome.value}"
     yield from (note for note in finding.manifest.get("assumed", ()) if "istrust" in note)
-    yield from (one.sentence for one in found_in(finding.manifest))
+    yield from _unstated(found_in(finding.manifest))
     if solution.velocity_m_s is None:
         yield "Reconstruct with the preset standard: it finds the velocity as well."
     if not any(isinstance(part, PointSensors) for part in scene.boundary):
@@ -122,6 +129,18 @@ def _advice(finding: Finding) -> Iterable[str]:
         yield (
             f"Solve on a finer grid than {scene.solve.grid} cells (scene.solve.grid, or the preset reference): "
             "a coarse one smears the jet."
+        )
+
+
+def _unstated(things: Sequence[Found]) -> Iterable[str]:
+    """What to do about things before the wall that the scene does not state; each is told in its own place."""
+    if things:
+        many = f"{len(things)} things" if len(things) > 1 else "Something"
+        hides, them = ("hide", "them") if len(things) > 1 else ("hides", "it")
+        percent = 100 * sum(one.share for one in things)
+        yield (
+            f"{many} that the scene does not state {hides} {percent:.1f} % of the wall: "
+            f"state {them} in experiment.toml, or take {them} away and capture again."
         )
 
 

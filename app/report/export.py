@@ -39,7 +39,8 @@ def export(
     source = (result or experiment.latest_result()) / "result.nc"
     # A collection is several files, packed.
     ending = "zip" if kind == "pvd" else kind
-    path = output or source.with_name(f"result-{'bursts' if kind == 'pvd' else 'export'}.{ending}")
+    named: dict[str, str] = {"pvd": "result-bursts", "pdf": "report"}
+    path = output or source.with_name(f"{named.get(kind, 'result-export')}.{ending}")
     if path.suffix != f".{ending}":
         raise BadInputError(f"The output is {path.name}; expected a name that ends in .{ending}.")
     if level_k is not None and kind != "ply":

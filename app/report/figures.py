@@ -161,7 +161,9 @@ def volume_figure(solution: Solution, values: np.ndarray, label: str, highest: f
 
 def plans_figure(plans: Sequence[FloorMap]) -> Figure:
     """Maps seen from above, side by side, each with its own scale from zero."""
-    figure = Figure(figsize=(13, 4.6), layout="constrained")
+    across_in = 13 / len(plans)
+    tall = max(float(np.ptp(plan.y_m) / np.ptp(plan.x_m)) for plan in plans)
+    figure = Figure(figsize=(13, min(0.65 * across_in * tall + 1.2, 4.6)), layout="constrained")
     axes = figure.subplots(1, len(plans), squeeze=False)[0]
     for axis, plan in zip(axes, plans, strict=True):
         most = float(np.nanmax(plan.values)) or 1e-6
@@ -172,7 +174,7 @@ def plans_figure(plans: Sequence[FloorMap]) -> Figure:
         axis.set_title(plan.title)
         axis.set_xlabel("x [m]")
         axis.set_ylabel("y [m]")
-        figure.colorbar(drawn, ax=axis, label=plan.label, shrink=0.6)
+        figure.colorbar(drawn, ax=axis, label=plan.label, shrink=0.8)
     return figure
 
 

@@ -7,6 +7,7 @@ samples moved so that their median is the found value: where a deviation is larg
 faster than the found air.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -139,10 +140,21 @@ def indoor(solution: Solution, scene: Scene, asked: IndoorAsked = IndoorAsked())
 def told(quantity: Quantity) -> tuple[str, str, str]:
     """A line of the table as text: name, value, 95 % interval."""
     unit = f" {quantity.unit}" if quantity.unit else ""
-    interval = "-"
-    if quantity.low is not None and quantity.high is not None:
-        interval = f"{_digits(quantity.low)} to {_digits(quantity.high)}{unit}"
-    return quantity.name, _digits(quantity.value) + unit, interval
+    if quantity.low is None or quantity.high is None or not quantity.high > quantity.low:
+        interval = "-" if quantity.low is None else f"{_digits(quantity.value)}{unit}"
+        return quantity.name, _digits(quantity.value) + unit, interval
+    places = _places(quantity.value, 0.5 * (quantity.high - quantity.low))
+    value, low, high = (
+        f"{round(number, places) + 0.0:.{places}f}"
+        for number in (quantity.value, quantity.low, quantity.high)
+    )
+    return quantity.name, value + unit, f"{low} to {high}{unit}"
+
+
+def _places(value: float, doubt: float) -> int:
+    """Decimals worth telling of a number known to +- `doubt`: 3 to 35 of its last unit, and three digits at most."""
+    worth, three = -math.floor(math.log10(doubt / 3.5)), 2 - math.floor(math.log10(max(abs(value), doubt)))
+    return max(0, min(worth, three))
 
 
 def _digits(value: float) -> str:

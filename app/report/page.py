@@ -16,7 +16,7 @@ from app.errors import BadInputError, explained
 from app.experiment.folder import Experiment, open_experiment
 from app.experiment.found import found_in
 from app.files.durable import write_text
-from app.report.answer import advice, summary
+from app.report.answer import advice, assumed, summary
 from app.report.beside import places, rows
 from app.report.figures import (
     as_data_uri,
@@ -28,7 +28,7 @@ from app.report.figures import (
     volume_figure,
 )
 from app.report.finding import Finding, read_finding
-from app.report.indoor import Indoor, told
+from app.report.indoor import told
 from app.report.maps_figure import maps_figure
 from app.report.room_figure import room_figure
 from app.report.tables import facts, origin, score_rows
@@ -52,12 +52,13 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with its pictures or its table, and why what is missing is missing."""
+    """A heading with its pictures, its table and notes on them, and why what is missing is missing."""
 
     title: str
     figures: tuple[Picture, ...] = ()
     heads: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
+    notes: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
 
 
@@ -100,7 +101,7 @@ def _sections(finding: Finding) -> list[Section]:
     made = [
         _air(finding),
         _indoor(finding),
-        _drawn("What stands before the wall and is not stated", lambda: _found(finding)),
+        _found(finding),
         _listed("What to do to know better", lambda: ((sentence,) for sentence in advice(finding))),
         _listed(
             "Against the truth", lambda: score_rows(finding), heads=("quantity", "error", "trivial answers")
@@ -111,11 +112,13 @@ def _sections(finding: Finding) -> list[Section]:
             _drawn(f"Calibration: {view.name}", lambda name=view.name: _calibration(finding.experiment, name))
             for view in finding.experiment.settings.scene.views
         ),
-        _listed("What was assumed", lambda: ((sentence,) for sentence in manifest["assumed"])),
+        _listed("What was assumed", lambda: ((sentence,) for sentence in assumed(manifest))),
         _listed("What was known, and of what", lambda: facts(finding.experiment)),
         _listed("Where this came from", lambda: origin(manifest)),
     ]
-    return [section for section in made if section.figures or section.rows or section.missing]
+    return [
+        section for section in made if section.figures or section.rows or section.notes or section.missing
+    ]
 
 
 def _drawn(title: str, *parts: Callable[[], Iterable[Picture]]) -> Section:
@@ -149,14 +152,24 @@ def _images(finding: Finding) -> Iterable[Picture]:
         )
 
 
-def _found(finding: Finding) -> Iterable[Picture]:
+def _found(finding: Finding) -> Section:
+    """What stands before the wall and is not stated, outlined and told."""
+    pictures = _drawn("What stands before the wall and is not stated", lambda: _outlined(finding))
+    return replace(
+        pictures, notes=tuple(f"{one.box.name}: {one.sentence}" for one in found_in(finding.manifest))
+    )
+
+
+def _outlined(finding: Finding) -> Iterable[Picture]:
     """The reference with what was found in it, for each view that has something."""
     everything = found_in(finding.manifest)
     for view in sorted({one.view for one in everything}):
         things = [one for one in everything if one.view == view]
         reference = finding.captures().reference.images[view].mean
-        said = " ".join(f"{one.box.name}: {one.sentence}" for one in things)
-        yield Picture(as_data_uri(found_figure(reference, things)), said)
+        names = ", ".join(one.box.name for one in things)
+        yield Picture(
+            as_data_uri(found_figure(reference, things)), f"The reference image; outlined: {names}."
+        )
 
 
 def _shifts(finding: Finding) -> Iterable[Picture]:
@@ -242,19 +255,14 @@ def _errors(finding: Finding) -> Iterable[Picture]:
 
 def _indoor(finding: Finding) -> Section:
     """Figures and maps for people and for ventilation."""
-    table = _listed(
-        "People and ventilation", lambda: _indoor_rows(finding.indoor), ("quantity", "value", "95 %")
-    )
+    heads = ("quantity", "value", "95 %")
+    table = _listed("People and ventilation", lambda: map(told, finding.indoor.quantities), heads)
+    if not table.missing:
+        table = replace(table, notes=(*finding.indoor.missing, *finding.indoor.notes))
     if finding.solution.velocity_m_s is None:
         return table
     maps = _drawn(table.title, lambda: _maps(finding))
     return replace(table, figures=maps.figures, missing=table.missing + maps.missing)
-
-
-def _indoor_rows(found: Indoor) -> Iterable[tuple[str, ...]]:
-    yield from (told(quantity) for quantity in found.quantities)
-    yield from (("not told", sentence, "") for sentence in found.missing)
-    yield from (("taken", sentence, "") for sentence in found.notes)
 
 
 def _maps(finding: Finding) -> Iterable[Picture]:

@@ -24,7 +24,7 @@ from reportlab.platypus import (
 
 from app.errors import explained
 from app.experiment.folder import open_experiment
-from app.report.answer import advice, summary
+from app.report.answer import advice, assumed, summary
 from app.report.beside import places, rows
 from app.report.figures import as_png, slices_figure, volume_figure
 from app.report.finding import Finding, read_finding
@@ -33,7 +33,8 @@ from app.report.maps_figure import maps_figure
 from app.report.room_figure import room_figure
 from app.report.tables import facts, score_rows
 
-_WIDTH = A4[0] - 30 * mm
+# A frame has 6 points of padding on each side.
+_WIDTH = A4[0] - 30 * mm - 12
 _TEXT = ParagraphStyle("text", fontName="Helvetica", fontSize=8.6, leading=11.2)
 _LEAD = ParagraphStyle("lead", parent=_TEXT, fontSize=10, leading=13.5, spaceAfter=3)
 _SMALL = ParagraphStyle("small", parent=_TEXT, fontSize=7.2, leading=9, textColor=colors.HexColor("#4a525c"))
@@ -47,7 +48,7 @@ _FIGURES = (
     "temperature_mean", "head_to_ankle", "speed_mean", "draught_rate_mean", "draught_rate_p95", "pmv", "ppd", "adpi",
     "air_changes", "mean_age", "efficiency", "zone_index", "supply_temperature", "exhaust_temperature", "heat",
 )  # fmt: skip
-_NOTES, _LONGEST = 9, 260
+_NOTES, _ADVICE, _LONGEST = 9, 5, 400
 
 _METHOD = (
     "A camera looks through the air at a patterned wall. Warm air bends light a little less than cold air, so the "
@@ -69,7 +70,7 @@ def write_pdf(finding: Finding, path: Path) -> None:
         str(path), pagesize=A4, leftMargin=15 * mm, rightMargin=15 * mm, topMargin=13 * mm, bottomMargin=12 * mm,
         title=f"{title}: the air", author="airlens",
     )  # fmt: skip
-    # A frame has 6 points of padding on each side; what is too much for its page is drawn smaller.
+    # What is too much for its page is drawn smaller.
     width, height = document.width - 12, document.height - 14
     first, second = (
         KeepInFrame(width, height, list(page), mode="shrink")
@@ -86,13 +87,13 @@ def _first(finding: Finding, title: str) -> Iterable[Flowable]:
     yield Spacer(1, 2 * mm)
     for sentence in summary(finding):
         yield _text(sentence, _LEAD)
-    yield from _picture(lambda: room_figure(finding.solution, finding.experiment.settings.scene), 0.8)
+    yield from _picture(lambda: room_figure(finding.solution, finding.experiment.settings.scene), 0.98)
     yield from _table(
         ("place", "temperature, 95 %", "true", "speed, 95 %", "true"),
         lambda: rows(places(finding.solution, finding.experiment.settings.scene, finding.truth)),
         (0.38, 0.19, 0.12, 0.19, 0.12),
     )
-    yield from _picture(lambda: maps_figure(finding), 0.84)
+    yield from _picture(lambda: maps_figure(finding), 1.0)
     yield _text(
         "Maps seen from above, 1.1 m over the floor, the height of sitting people's heads. Truths are known of "
         "simulated rooms only.",
@@ -113,13 +114,14 @@ def _second(finding: Finding) -> Iterable[Flowable]:
         ("quantity", "error", "trivial answers"), lambda: score_rows(finding), (0.4, 0.15, 0.45)
     )
     yield _text("What to do to know better", _HEAD)
-    yield _text(" ".join(_short(sentence) for sentence in advice(finding)[:4]), _TEXT)
+    for sentence in advice(finding)[:_ADVICE]:
+        yield _text(f"• {_short(sentence)}", _TEXT)
     yield _text("Method and rig", _HEAD)
     yield _text(_METHOD, _TEXT)
     known = "; ".join(f"{name}: {words}" for name, words in facts(finding.experiment))
     yield _text(_short(known, 3 * _LONGEST), _SMALL)
     yield _text("What was assumed, and limits", _HEAD)
-    told_of = [_short(sentence) for sentence in finding.manifest.get("assumed", ())][:_NOTES]
+    told_of = [_short(sentence) for sentence in assumed(finding.manifest)][:_NOTES]
     yield _text(" ".join(told_of), _SMALL)
     yield _text(
         "The air is a mean over the exposure. The report in HTML beside the result has every sentence and the hashes "

@@ -1,4 +1,5 @@
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -102,3 +103,11 @@ def test_many_jobs_are_queued_all_or_none(tmp_path: Path):
     with pytest.raises(JobError):
         ledger.submit_many([spec(1), spec(2)], keys=["same", "same"])
     assert ledger.jobs() == []
+
+
+def test_a_job_that_is_done_is_whole_wherever_its_steps_ended(tmp_path: Path):
+    ledger = Ledger(tmp_path)
+    job = replace(ledger.submit(spec()), step=99, steps=100)
+
+    assert replace(job, state=JobState.failed).progress == pytest.approx(0.99)
+    assert replace(job, state=JobState.done).progress == 1.0

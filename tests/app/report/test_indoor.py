@@ -190,3 +190,21 @@ def test_the_report_has_the_table_and_the_maps(experiment):
     assert section.count("data:image/png") == 1
     assert "air change efficiency" in section
     assert 'class="missing"' not in section
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "said"),
+    [
+        (0.018225, 0.00731, 0.0776, ("0.02 m/s", "0.01 to 0.08 m/s")),
+        (0.018225, 0.0109, 0.0417, ("0.018 m/s", "0.011 to 0.042 m/s")),
+        (23.85, 23.804, 23.864, ("23.9 m/s", "23.8 to 23.9 m/s")),
+        (5.7378, 3.4722, 8.3933, ("5.7 m/s", "3.5 to 8.4 m/s")),
+        (350.2, 219.4, 511.3, ("350 m/s", "219 to 511 m/s")),
+        (68.35, 34.56, 74.53, ("68 m/s", "35 to 75 m/s")),
+        (-0.0001, -0.5, 0.5, ("0.0 m/s", "-0.5 to 0.5 m/s")),
+        (0.0, 0.0, 0.0, ("0 m/s", "0 m/s")),
+        (12.345, None, None, ("12.3 m/s", "-")),
+    ],
+)
+def test_a_figure_has_the_digits_that_its_interval_is_worth(value, low, high, said):
+    assert told(Quantity("speed", "speed", "m/s", value, low, high))[1:] == said

@@ -124,13 +124,21 @@ def test_what_was_found_before_the_wall_is_drawn_and_told(kept):
     thing = Found(
         0, 0.1, (0.0, 0.5), (-1.0, 0.1), (64.0, 40.0, 88.0, 90.0), "seen", box, True, "It stands there."
     )
-    told = replace(kept, manifest={**kept.manifest, "found": to_plain((thing,))})
+    told = replace(
+        kept,
+        manifest={
+            **kept.manifest,
+            "found": to_plain((thing,)),
+            "assumed": [*kept.manifest["assumed"], "It stands there."],
+        },
+    )
     page = render_report(told)
     assert missing(page) == []
     assert "found 1: It stands there." in page
     assert page.count("data:image/png") == render_report(kept).count("data:image/png") + 1
-    # What to do comes first from there.
-    assert "<td>It stands there.</td>" in page
+    # It is told once; what to do about it stands with the other advice.
+    assert page.count("It stands there.") == 1
+    assert "<td>Something that the scene does not state hides 10.0 % of the wall" in page
 
 
 def test_a_result_of_an_older_program_is_reported_with_what_it_has(kept):

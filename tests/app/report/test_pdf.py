@@ -26,7 +26,7 @@ def test_the_answer_is_three_sentences_without_jargon(finding):
     assert len(said) == 3
     # 295 K at the floor and 2 K/m: 21.85 °C, and vertices from 0.3 to 1.7 m, 1.0 m on the mean, are in the zone.
     assert "23.9 °C" in said[0]
-    assert "0.1 m/s" in said[0]
+    assert "0.100 m/s (0.090 to 0.109)" in said[0]
     assert "90 times an hour" in said[1]
     assert "no truth" in said[2]
     assert not any(word in " ".join(said) for word in ("rms", "sigma", "posterior", "px"))
@@ -47,4 +47,4 @@ def test_the_pdf_has_two_pages_with_pictures(finding, tmp_path):
 def test_the_command_writes_it(experiment):  # noqa: F811
     ran = CliRunner().invoke(create_cli(), ["report", str(experiment.folder), "--pdf"])
     assert ran.exit_code == 0, ran.output
-    assert pages((experiment.results_folder / "one" / "result-export.pdf").read_bytes()) == 2
+    assert pages((experiment.results_folder / "one" / "report.pdf").read_bytes()) == 2
