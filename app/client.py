@@ -309,9 +309,14 @@ class Client:
         pictures: Mapping[Role, Sequence[str]],
         bits: int | None = None,
         ambient_temperature_k: float | None = None,
+        view: str | None = None,
     ) -> list[CaptureResource]:
-        """Make captures of uploaded pictures: the ids of the uploads for each role."""
-        roles = [{"role": role, "uploads": list(uploads)} for role, uploads in pictures.items()]
+        """Make captures of uploaded pictures: the ids of the uploads for each role.
+
+        `view` is the camera that took them, by its name; of several views each one's pictures are imported by
+        themselves, and a capture waits for those that it names as `missing`.
+        """
+        roles = [{"role": role, "view": view, "uploads": list(uploads)} for role, uploads in pictures.items()]
         body = {"pictures": roles, "bits": bits, "ambient_temperature_k": ambient_temperature_k}
         path = f"/experiments/{experiment}/captures/imported"
         return self._ask(list[CaptureResource], "POST", path, body)
@@ -364,10 +369,10 @@ class Client:
         path = f"/experiments/{experiment}/captures/{capture}/picture"
         return self._bytes(path, {"width": str(width)}).content
 
-    def capture_image(self, experiment: str, capture: str) -> Float[np.ndarray, "rows cols"]:
-        """Return a capture's mean image as fractions of full scale."""
+    def capture_image(self, experiment: str, capture: str, view: int = 0) -> Float[np.ndarray, "rows cols"]:
+        """Return the mean image of a capture's view, by its number, as fractions of full scale."""
         path = f"/experiments/{experiment}/captures/{capture}/image"
-        return _unpack(self._bytes(path, {"encoding": "f32"}))
+        return _unpack(self._bytes(path, {"encoding": "f32", "view": str(view)}))
 
     def change_experiment(
         self,

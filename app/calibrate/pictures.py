@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 import tifffile
 
-from app.capture.burst import BurstWatch, shoot
+from app.capture.burst import shoot
+from app.capture.watched import BurstWatch
 from app.errors import AirlensError
 from app.files.durable import write_durably
 from app.rig.stage import Stage

@@ -5,27 +5,28 @@ record, run, judge, origin, keep. A calibration takes its pictures with `shoot`,
 """
 
 import contextlib
+import shlex
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from app.capture.checks import judged
-from app.experiment.captures import CaptureRecorder
+from app.capture.views import bursts_of_views, together, view_names
+from app.capture.watched import UNWATCHED, BurstWatch, run_watched
 from app.experiment.folder import Experiment, new_id
+from app.experiment.recorder import CaptureRecorder
 from app.files.disk_space import check_room
 from app.rig.conditions import UNTOLD, Conditions, conditions_of, known_pairs, seconds_on
-from app.rig.open import air_of, clock_of, open_camera
+from app.rig.open import air_of, clock_of
 from drivers.burst import Burst, BurstOutcome, CapturePlan
-from drivers.capture import Abort, OnFrame, OnProgress, Taken, run_capture
+from drivers.capture import Abort
 from drivers.errors import DeviceSettingError
 from drivers.protocols import Camera
 from drivers.sequence import BurstStart, check_times, evenly, run_sequence
 from drivers.verdict import Verdict
-
-OnAbort = Literal["keep", "discard"]
 
 
 @dataclass(frozen=True)
@@ -46,28 +47,28 @@ class Order:
 
 
 @dataclass(frozen=True)
-class BurstWatch:
-    """Who follows a burst: hears of every frame, and ends it by saying what becomes of the frames so far.
-
-    `begun` hears of the folder of every new capture.
-    """
-
-    progress: OnProgress | None = None
-    frame: OnFrame | None = None
-    stop: Callable[[], OnAbort | None] = lambda: None
-    begun: Callable[[Path], object] = lambda folder: None
-
-
-@dataclass(frozen=True)
 class TakenBurst:
-    """A burst and where it is; no folder when it was discarded."""
+    """A burst and where it is; no folder when it was discarded.
+
+    Of several views `burst` stands for all, and `failed` says by a view's name why it has no picture.
+    """
 
     burst: Burst
     folder: Path | None
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def shortfall(self) -> str:
         """Why this is not what was asked for, and what to do; empty when it is."""
+        stopped = self.burst.outcome is BurstOutcome.ABORTED
+        if self.failed and self.folder is not None and not stopped:
+            missing = ", ".join(map(repr, self.failed))
+            reasons = " ".join(f"{name}: {_sentence(reason)}" for name, reason in self.failed.items())
+            return (
+                f"The {self.burst.plan.role} capture {self.folder.name} lacks the pictures of {missing}. {reasons} "
+                f"What the other cameras took is kept: airlens capture retake {_experiment_of(self.folder)} "
+                f"--view {shlex.quote(next(iter(self.failed)))} takes that camera's alone."
+            )
         if self.burst.outcome is BurstOutcome.COMPLETE:
             return ""
         kept = "They were discarded, as asked."
@@ -79,7 +80,12 @@ class TakenBurst:
         )
 
 
-_UNWATCHED = BurstWatch()
+def _sentence(text: str) -> str:
+    return text if text.endswith(".") else f"{text}."
+
+
+def _experiment_of(capture: Path) -> str:
+    return shlex.quote(str(capture.parent.parent))
 
 
 def take(
@@ -87,7 +93,7 @@ def take(
     experiment: Experiment,
     plan: CapturePlan,
     told: Conditions = UNTOLD,
-    watch: BurstWatch = _UNWATCHED,
+    watch: BurstWatch = UNWATCHED,
     *,
     sequence: dict[str, Any] | None = None,
     name: str | None = None,
@@ -99,73 +105,62 @@ def take(
     """Take one burst into a new folder below captures/, by `name` where that was given out already.
 
     The cameras of further views are opened one after the other once the first has ended, and all pictures are one
-    capture; what is said of it is said of all. A raw stack is kept of the first. `moment` is as in `open_camera`.
-    `sequence` says which burst of how many it is. `source` says where the frames come from, where that is not the
-    rig; `known` are verdicts that the frames cannot tell; `series` is its place between two references. Raises
-    AirlensError without room for it, DeviceError.
+    capture. One that fails is named by `failed`, and what the others took is kept. A raw stack is kept of the first.
+    `moment` is as in `open_camera`; `sequence` says which burst of how many it is; `source` says where the frames
+    come from, where that is not the rig; `known` are verdicts that the frames cannot tell; `series` is its place
+    between two references. Raises AirlensError without room for it, DeviceError.
     """
     check_room(experiment.folder, plan, camera.info)
     name = name or new_id(experiment.captures_folder, plan.role)
     recorder = CaptureRecorder(experiment.captures_folder / name, plan)
     watch.begun(recorder.folder)
     try:
-        views = len(experiment.settings.scene.views) if source is None else 1
-        bursts = [_run(camera, plan, watch, recorder.observe, seconds_on(experiment.settings, told))]
-        if views > 1:
-            bursts += _of_other_views(bursts[0], experiment, plan, told, watch, moment)
-        if bursts[-1].outcome is BurstOutcome.ABORTED and watch.stop() == "discard":
-            recorder.discard()
-            return TakenBurst(bursts[-1], None)
-        bursts[0] = replace(bursts[0], verdicts=(*bursts[0].verdicts, *known))
-        bursts = [judged(experiment, burst, told, view) for view, burst in enumerate(bursts)]
-        origin = dict(source) if source is not None else _rig(experiment, plan)
+        origin = dict(source) if source is not None else origin_of(experiment, plan)
         origin |= known_pairs(conditions_of(experiment.settings, told))
         origin |= {} if sequence is None else {"sequence": sequence}
         origin |= {} if series is None else {"series": dict(series)}
-        return TakenBurst(_together(bursts, experiment), recorder.keep(bursts, origin, views))
+        if source is None and len(experiment.settings.scene.views) > 1:
+            return _take_views(camera, experiment, plan, told, watch, recorder, origin, moment)
+        burst = run_watched(camera, plan, watch, recorder.observe, seconds_on(experiment.settings, told))
+        if burst.outcome is BurstOutcome.ABORTED and watch.stop() == "discard":
+            recorder.discard()
+            return TakenBurst(burst, None)
+        burst = judged(experiment, replace(burst, verdicts=(*burst.verdicts, *known)), told)
+        return TakenBurst(burst, recorder.keep(burst, origin))
     except BaseException:
         recorder.leave()
         raise
 
 
-def _of_other_views(
-    first: Burst,
+def _take_views(
+    camera: Camera,
     experiment: Experiment,
     plan: CapturePlan,
     told: Conditions,
     watch: BurstWatch,
+    recorder: CaptureRecorder,
+    origin: Mapping[str, Any],
     moment: int | None,
-) -> list[Burst]:
-    """The bursts of the views after the first, until one is not complete."""
-    bursts = [first]
-    for view in range(1, len(experiment.settings.scene.views)):
-        if bursts[-1].outcome is not BurstOutcome.COMPLETE:
-            break
-        with open_camera(experiment, air_of(plan.role), view, moment) as camera:
-            seconds = seconds_on(experiment.settings, told)
-            bursts.append(_run(camera, plan, watch, lambda taken: None, seconds))
-    return bursts[1:]
-
-
-def _together(bursts: list[Burst], experiment: Experiment) -> Burst:
-    """The burst that stands for those of all views: the first, or one that ended early, with the verdicts of all."""
-    if len(bursts) == 1:
-        return bursts[0]
-    names = [view.name for view in experiment.settings.scene.views]
-    verdicts = [
-        replace(verdict, name=f"{name}: {verdict.name}")
-        for name, burst in zip(names, bursts, strict=False)
-        for verdict in burst.verdicts
-    ]
-    whole = bursts[-1].outcome is BurstOutcome.COMPLETE
-    return replace(bursts[0 if whole else -1], verdicts=tuple(verdicts))
+) -> TakenBurst:
+    """The bursts of all views as one capture. Raises what the first camera raised where none took a frame."""
+    names = view_names(experiment)
+    found = bursts_of_views(camera, experiment, plan, told, watch, recorder.observe, moment)
+    if not found.bursts:
+        raise found.errors[0]
+    burst = together(found.bursts, names)
+    if burst.outcome is BurstOutcome.ABORTED and watch.stop() == "discard":
+        recorder.discard()
+        return TakenBurst(burst, None)
+    bursts = {number: judged(experiment, one, told, number) for number, one in found.bursts.items()}
+    recorder.keep_views(bursts, names, origin)
+    return TakenBurst(together(bursts, names), recorder.folder, found.failed)
 
 
 def take_order(
     camera: Camera,
     experiment: Experiment,
     order: Order,
-    watch: BurstWatch = _UNWATCHED,
+    watch: BurstWatch = UNWATCHED,
     name: str | None = None,
 ) -> list[TakenBurst]:
     """Take every burst of an order, the first by `name`; fewer when it is stopped.
@@ -189,31 +184,13 @@ def take_order(
     return taken
 
 
-def shoot(camera: Camera, where: Path, plan: CapturePlan, watch: BurstWatch = _UNWATCHED) -> Burst:
+def shoot(camera: Camera, where: Path, plan: CapturePlan, watch: BurstWatch = UNWATCHED) -> Burst:
     """Take a burst that becomes no capture. Raises AirlensError without room for it at `where`, DeviceError."""
     check_room(where, plan, camera.info)
-    return _run(camera, plan, watch, lambda taken: None, None)
+    return run_watched(camera, plan, watch, lambda taken: None, None)
 
 
-def _run(
-    camera: Camera, plan: CapturePlan, watch: BurstWatch, keep: OnFrame, rig_on_s: float | None
-) -> Burst:
-    def follow(taken: Taken) -> None:
-        keep(taken)
-        if watch.frame is not None:
-            watch.frame(taken)
-
-    return run_capture(
-        camera,
-        plan,
-        watch.progress,
-        on_frame=follow,
-        abort=lambda: watch.stop() is not None,
-        rig_on_s=rig_on_s,
-    )
-
-
-def _rig(experiment: Experiment, plan: CapturePlan) -> dict[str, Any]:
+def origin_of(experiment: Experiment, plan: CapturePlan) -> dict[str, Any]:
     """Which rig took it, and what a simulated room did."""
     kind = experiment.settings.rig.camera_kind
     return {"rig": kind, "air": air_of(plan.role)} if kind == "simulated" else {"rig": kind}

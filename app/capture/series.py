@@ -5,7 +5,8 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 
-from app.capture.burst import BurstWatch, TakenBurst, take
+from app.capture.burst import TakenBurst, take
+from app.capture.watched import BurstWatch
 from app.errors import AirlensError
 from app.experiment.captures import newest_pair
 from app.experiment.folder import Experiment, new_id

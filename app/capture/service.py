@@ -14,10 +14,11 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from app.capture.burst import BurstWatch, OnAbort, Order, TakenBurst, take_order
+from app.capture.burst import Order, TakenBurst, take_order
+from app.capture.watched import BurstWatch, OnAbort
 from app.errors import AirlensError
-from app.experiment.captures import release, reserve
 from app.experiment.folder import Experiment, new_id
+from app.experiment.recorder import release, reserve
 from app.rig.live_camera import LiveCamera
 from app.rig.open import AirState, air_of, open_camera
 from app.states import StateMachine
@@ -265,6 +266,8 @@ def _ending(order: Order, taken: list[TakenBurst]) -> tuple[CaptureEvent, str]:
     if not taken:
         return CaptureEvent.abort, "Stopped before the first burst; nothing was taken."
     last = taken[-1]
+    if last.failed and last.burst.outcome is not BurstOutcome.ABORTED:
+        return CaptureEvent.cut_short, last.shortfall
     if last.shortfall or len(taken) == order.bursts:
         return OUTCOMES[last.burst.outcome], last.shortfall
     return CaptureEvent.abort, f"Stopped after {len(taken)} of {order.bursts} bursts; they are kept."

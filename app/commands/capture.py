@@ -29,6 +29,7 @@ def register(cli: typer.Typer) -> None:
     for role, text in _ROLES.items():
         group.command(role, help=text)(_command(role))
     group.command()(series)
+    group.command("retake")(take_again)
     group.command()(watch)
     cli.add_typer(group, name="capture")
 
@@ -75,7 +76,8 @@ def _command(role: "CaptureRole"):
 
 
 def _take(folder: Path, order, on_abort: OnAbort, as_json: bool) -> None:
-    from app.capture.burst import BurstWatch, interruptible, take_order
+    from app.capture.burst import interruptible, take_order
+    from app.capture.watched import BurstWatch
     from app.experiment.folder import open_experiment
     from app.rig.open import air_of, open_camera
 
@@ -108,6 +110,7 @@ def _summary(one) -> dict[str, Any]:
         "refused": dict(burst.refused),
         "settings": {s.name: {"asked": s.asked, "granted": s.granted} for s in burst.settings},
         "verdicts": [{"name": v.name, "good": v.good, "value": v.value} for v in burst.verdicts],
+        "missing": dict(one.failed),
     }
 
 
@@ -120,6 +123,39 @@ def said(one) -> str:
         f"  {v.name} {v.value:.3g}: expected {v.expected}. {v.advice}" for v in burst.verdicts if not v.good
     ]
     return "\n".join(lines)
+
+
+def take_again(
+    experiment: Folder,
+    view: Annotated[
+        str | None, typer.Option(help="Which camera, by its view's name; the missing one, where one is.")
+    ] = None,
+    capture: Annotated[str | None, typer.Option(help="Which capture, by its folder; the newest.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Take one camera's picture of a capture again, alone, as it was asked for; the other cameras' stay."""
+    from app.capture.burst import interruptible
+    from app.capture.retake import place_of, retake, to_retake
+    from app.capture.watched import BurstWatch
+    from app.experiment.folder import open_experiment
+    from app.rig.open import air_of, open_camera
+
+    opened = open_experiment(experiment)
+    parts, number = to_retake(opened, capture, view)
+    with (
+        open_camera(opened, air_of(parts.plan.role), number, place_of(parts.origin)) as camera,
+        interruptible() as stopped,
+        Bar(transient=True) as bar,
+    ):
+        task = bar.add_task(parts.names[number], total=parts.plan.frames)
+        watch = BurstWatch(
+            progress=lambda now: bar.update(task, completed=now.done),
+            stop=lambda: "keep" if stopped() else None,
+        )
+        taken = retake(camera, opened, parts, number, watch=watch)
+    typer.echo(json.dumps(_summary(taken)) if as_json else said(taken))
+    if taken.shortfall:
+        raise AirlensError(taken.shortfall)
 
 
 def series(
@@ -138,8 +174,9 @@ def series(
     """Take reference, flow and reference again, and say how far the camera moved meanwhile."""
     from rich.progress import Progress as Bar
 
-    from app.capture.burst import BurstWatch, interruptible
+    from app.capture.burst import interruptible
     from app.capture.series import take_series
+    from app.capture.watched import BurstWatch
     from app.experiment.folder import open_experiment
     from app.rig.open import air_of, open_camera
     from drivers.burst import CapturePlan

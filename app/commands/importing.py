@@ -20,6 +20,10 @@ def bring(
     flow: Annotated[Pictures, typer.Option(help="Pictures with the air moving.")] = [],  # noqa: B006
     dark: Annotated[Pictures, typer.Option(help="Pictures with the lens covered.")] = [],  # noqa: B006
     flat: Annotated[Pictures, typer.Option(help="Pictures of an even, bright wall.")] = [],  # noqa: B006
+    view: Annotated[
+        str | None,
+        typer.Option(help="Which camera took them, of an experiment with several views: the view's name."),
+    ] = None,
     bits: Annotated[
         int | None,
         typer.Option(min=1, max=16, help="Bits of the counts, where files of 16 bits hold fewer."),
@@ -28,11 +32,14 @@ def bring(
         float | None, typer.Option(min=150, max=400, help="Temperature of the room [K] (the scene's).")
     ] = None,
 ) -> None:
-    """Make captures of pictures that another camera took: TIFF, PNG, JPEG, or raw files (by airlens[raw])."""
+    """Make captures of pictures that another camera took: TIFF, PNG, JPEG, or raw files (by airlens[raw]).
+
+    Of several views each camera's pictures are imported by themselves, in any order; a capture waits for the others.
+    """
     from rich.progress import Progress as Bar
 
-    from app.capture.burst import BurstWatch
     from app.capture.imported import import_pictures
+    from app.capture.watched import BurstWatch
     from app.commands.capture import said
     from app.experiment.folder import open_experiment
     from app.rig.conditions import Conditions
@@ -48,6 +55,11 @@ def bring(
             "dark": dark,
             "flat": flat,
         }
-        taken = import_pictures(opened, names, bits, Conditions(ambient_temperature_k), watch)
+        taken = import_pictures(opened, names, bits, Conditions(ambient_temperature_k), watch, view)
     for one in taken:
         typer.echo(said(one))
+        if one.failed:
+            missing = ", ".join(map(repr, one.failed))
+            typer.echo(
+                f"  The {one.burst.plan.role} is whole once the pictures of {missing} are there: import them too."
+            )

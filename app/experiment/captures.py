@@ -6,15 +6,12 @@
         manifest.json       last: what was asked, what was granted, every frame, every verdict
         incomplete.json     only while the burst runs, or after it was cut short
         partial.tif         the moments so far, renewed every few seconds
+        part-1.json         of several views, what is known of one that is there while another is missing
 
 A folder without a manifest is an interrupted capture: what it holds can be read, and is never a measurement.
 """
 
-import contextlib
 import hashlib
-import os
-import shutil
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -24,17 +21,13 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter
 
-from app.errors import AirlensError, BadInputError
-from app.experiment.capture_files import BurstImage, RawStack, decode_image, read_image, write_image
+from app.errors import BadInputError
+from app.experiment.capture_files import BurstImage, decode_image, read_image, write_image
 from app.experiment.folder import Experiment, finished, parse_manifest, read_manifest, write_manifest
-from app.files.durable import make_folder, sync, write_json
 from app.files.provenance import sha256
 from app.files.reading import inside, reading
-from app.files.toml import to_plain
-from drivers.burst import Burst, BurstOutcome, CapturePlan
-from drivers.capture import Taken
+from drivers.burst import Burst, BurstOutcome
 
-CHECKPOINT_S = 5.0
 # As near as a camera grants what is asked of it.
 MAX_SETTING_OFF = 0.01
 
@@ -184,22 +177,30 @@ def write_capture(
         path = folder / image_name(role, number)
         write_image(path, BurstImage(one.mean, one.std, one.frames))
         views.append({"file": path.name, "sha256": sha256(path)} | describe_burst(one))
+    complete = all(one.outcome is BurstOutcome.COMPLETE for one in bursts)
+    finish(folder, role, views, complete, origin or {})
+    return folder
+
+
+def finish(
+    folder: Path, role: str, views: Sequence[Mapping[str, Any]], complete: bool, origin: Mapping[str, Any]
+) -> None:
+    """Write the manifest of a capture whose pictures are there; `views` say what is known of each."""
     raw = folder / "frames.tif"
     write_manifest(
         folder,
         {
             "schema_version": 1,
             "role": role,
-            "complete": all(one.outcome is BurstOutcome.COMPLETE for one in bursts),
+            "complete": complete,
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
-            "views": views,
+            "views": list(views),
             "raw": {"file": raw.name, "sha256": sha256(raw)} if raw.exists() else None,
-            "origin": dict(origin or {}),
+            "origin": dict(origin),
         },
     )
     for leftover in ("incomplete.json", "partial.tif"):
         (folder / leftover).unlink(missing_ok=True)
-    return folder
 
 
 def image_name(role: str, view: int = 0) -> str:
@@ -252,103 +253,6 @@ def _kept_image(folder: Path, view: Mapping[str, Any], read: dict[str, str]) -> 
         )
     read[path.name] = found
     return decode_image(content, path)
-
-
-def reserve(folder: Path, plan: CapturePlan) -> None:
-    """Make the folder of a capture that is about to begin: from now on a crash leaves it as an interrupted one.
-
-    Nothing stays when the disk refuses it (OSError). Raises BadInputError when the experiment is gone.
-    """
-    if not folder.parent.parent.is_dir():
-        raise BadInputError(
-            f"There is no {folder.parent.parent} any more: nothing can be taken into it. Restore the experiment, "
-            "or make another one."
-        )
-    make_folder(folder.parent)
-    folder.mkdir()
-    try:
-        sync(folder.parent)
-        started = datetime.now(UTC).isoformat(timespec="seconds")
-        about = {"role": plan.role, "plan": to_plain(plan), "started": started, "process": os.getpid()}
-        write_json(folder / "incomplete.json", about)
-    except OSError:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise
-
-
-def release(folder: Path) -> None:
-    """Remove the folder of a capture that never had a frame; any other one stays as it is."""
-    with contextlib.suppress(OSError):
-        if [path.name for path in folder.iterdir()] == ["incomplete.json"]:
-            shutil.rmtree(folder, ignore_errors=True)
-
-
-class CaptureRecorder:
-    """Follows a burst while it runs, so that a crash leaves what was taken before, marked as incomplete.
-
-    Hand `observe` to `run_capture` as `on_frame`; then call `keep` or `discard`.
-    """
-
-    def __init__(self, folder: Path, plan: CapturePlan, checkpoint_s: float = CHECKPOINT_S) -> None:
-        if not (folder / "incomplete.json").exists():
-            reserve(folder, plan)
-        self.folder, self._checkpoint_s = folder, checkpoint_s
-        self._saved_s = float("-inf")
-        self._stack = RawStack(folder / "frames.tif") if plan.raw_stack else None
-
-    def observe(self, taken: Taken) -> None:
-        """Append to the raw stack; renew the moments when their time has come."""
-        if self._stack:
-            self._stack.add(taken.frame, taken.record)
-        began_s = time.monotonic()
-        if began_s - self._saved_s < self._checkpoint_s:
-            return
-        self._check()
-        full_scale = taken.frame.full_scale_counts
-        moments = taken.moments
-        image = BurstImage(moments.mean(full_scale), moments.std(full_scale), moments.frames)
-        write_image(self.folder / "partial.tif", image)
-        # A slow disk must not slow the burst down: at most a tenth of the time goes into checkpoints.
-        self._saved_s = time.monotonic()
-        self._checkpoint_s = max(self._checkpoint_s, 10 * (self._saved_s - began_s))
-
-    def keep(self, bursts: Sequence[Burst], origin: Mapping[str, Any] | None = None, views: int = 1) -> Path:
-        """Finish the folder, a burst a view. What a device cut short, or lacks a view, gets no manifest.
-
-        It is no measurement.
-        """
-        self._close()
-        self._check()
-        burst = bursts[-1]
-        if len(bursts) == views and burst.outcome in (BurstOutcome.COMPLETE, BurstOutcome.ABORTED):
-            return write_capture(self.folder, bursts, origin=origin)
-        write_image(self.folder / "partial.tif", BurstImage(burst.mean, burst.std, burst.frames))
-        write_json(self.folder / "incomplete.json", {"role": burst.plan.role} | describe_burst(burst))
-        return self.folder
-
-    def discard(self) -> None:
-        """Remove the folder and what was taken."""
-        self._close()
-        shutil.rmtree(self.folder)
-
-    def leave(self) -> None:
-        """End without a burst: frames stay as an interrupted capture; where there are none, nothing stays."""
-        self._close()
-        if not any((self.folder / name).exists() for name in ("partial.tif", "manifest.json")):
-            shutil.rmtree(self.folder, ignore_errors=True)
-
-    def _check(self) -> None:
-        """Raise AirlensError when somebody has removed the folder: what is written now would be of no use."""
-        if not (self.folder / "incomplete.json").exists():
-            raise AirlensError(
-                f"The folder {self.folder} was removed while its capture was taken; nothing of it is kept. "
-                "Take it again."
-            )
-
-    def _close(self) -> None:
-        if self._stack:
-            self._stack.close()
-            self._stack = None
 
 
 def _plain(value: Any) -> Any:

@@ -7,8 +7,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
-from app.capture.burst import BurstWatch, take
+from app.capture.burst import take
 from app.capture.series import PLACES
+from app.capture.watched import BurstWatch
 from app.errors import AirlensError, BadInputError
 from app.experiment.folder import (
     TRUTH_FILE,

@@ -51,16 +51,23 @@ class NewCapture(WireModel):
 
 
 class RolePictures(WireModel):
-    """Uploaded pictures of one role: each upload is a picture, or a TIFF of many."""
+    """Uploaded pictures of one role: each upload is a picture, or a TIFF of many.
+
+    `view` is the camera's; where there is one view it may be left out.
+    """
 
     role: Role
+    view: str | None = Field(default=None, max_length=200)
     uploads: list[Named] = Field(min_length=1, max_length=1000)
 
 
 class NewImport(WireModel):
-    """Pictures that another camera took. `bits` are those of the counts where the files hold more."""
+    """Pictures that another camera took. `bits` are those of the counts where the files hold more.
 
-    pictures: list[RolePictures] = Field(min_length=1, max_length=4)
+    A capture of several views waits, as an interrupted one, until the pictures of all are there.
+    """
+
+    pictures: list[RolePictures] = Field(min_length=1, max_length=64)
     bits: int | None = Field(default=None, ge=1, le=16)
     ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
 
@@ -89,8 +96,28 @@ class SettingResource(WireModel):
     granted: float | None
 
 
+class ViewPicture(WireModel):
+    """What one camera took of a capture, and how good it is."""
+
+    view: str
+    frames: int | None
+    width_px: int | None
+    height_px: int | None
+    verdicts: list[VerdictResource]
+    settings: list[SettingResource]
+
+
+class Retake(WireModel):
+    """Which camera takes its picture again, by the name of its view."""
+
+    view: str = Field(max_length=200)
+
+
 class CaptureResource(WireModel):
     """One capture. `interrupted` ones have no manifest and are never used as a measurement.
+
+    `views` are the cameras' pictures, each with its verdicts; frames, size, verdicts and settings beside it are those
+    of the first. `missing` names the views that an interrupted one waits for.
 
     `sequence` is the same for all bursts of one sequence, and none for a single burst.
     `reason` says why a `broken` one cannot be read. `revision` goes into the `If-Match` of a change of its notes.
@@ -107,6 +134,8 @@ class CaptureResource(WireModel):
     settings: list[SettingResource]
     notes: str
     revision: str
+    views: list[ViewPicture]
+    missing: list[str]
     sequence: str | None = None
     reason: str = ""
 

@@ -27,6 +27,13 @@ class NextResource(WireModel):
     reason: str
 
 
+class SeenWallLine(WireModel):
+    """A view: what its camera is called, and the wall that it looks at."""
+
+    name: str
+    wall: str
+
+
 class ExperimentLine(WireModel):
     """One line of the list of experiments; `uncalibrated` names the parts of the rig that need it still.
 
@@ -47,6 +54,7 @@ class ExperimentLine(WireModel):
     results: int
     changed: str
     revision: str
+    views: list[SeenWallLine]
     next: NextResource | None = None
     reason: str = ""
 

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import cv2
 import numpy as np
 from fastapi import APIRouter, Query, Response
 
-from app.api.folders import child, shown_name
+from app.api.folders import child
 from app.api.models.captures import (
     Abort,
     CaptureChange,
@@ -17,29 +17,27 @@ from app.api.models.captures import (
     DeskResource,
     NewCapture,
     NewImport,
-    SettingResource,
-    VerdictResource,
 )
 from app.api.services import Given, Services
 from app.api.wire.bodies import body
+from app.api.wire.captured import NOTES, capture_line, capture_resource
 from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
 from app.api.wire.revision import IfMatch, check_revision, etag
 from app.api.wire.volumes import Encoding, pack
 from app.capture.burst import Order
-from app.capture.imported import import_files
+from app.capture.imported import TakenBy, import_files
 from app.capture.service import DeskState
+from app.capture.views import view_names
 from app.errors import BadInputError
 from app.experiment.capture_files import BurstImage
 from app.experiment.captures import load_capture
-from app.experiment.folder import read_manifest, revision_of
 from app.files.durable import write_text
-from app.files.reading import reading
 from app.rig.conditions import Conditions, conditions_in
-from drivers.burst import CapturePlan, CaptureRole
+from drivers.burst import CapturePlan
 
 router = APIRouter(tags=["captures"])
-NOTES = "notes.txt"
+ViewNumber = Annotated[int, Query(ge=0, lt=100, description="Which view's picture, from 0.")]
 PICTURE = body("image/png", "A picture for the eyes: stretched from the 1st to the 99th percentile.")
 NUMBERS = body("application/octet-stream", "Rows of little-endian numbers; value = X-Offset + X-Scale * n.")
 
@@ -74,11 +72,13 @@ def order_of(new: NewCapture) -> Order:
 def import_captures(given: Given, experiment: Identifier, new: NewImport) -> list[CaptureResource]:
     """Make captures of uploaded pictures that another camera took; the uploads are removed."""
     found = given.folders.open(experiment)
-    files: dict[CaptureRole, list[Path]] = {}
+    files: dict[TakenBy, list[Path]] = {}
     for one in new.pictures:
-        files[one.role] = [path for upload in one.uploads for path in _pictures(given, upload)]
-    lossy: list[CaptureRole] = [
-        one.role for one in new.pictures if "jpeg" in map(given.uploads.kind, one.uploads)
+        files[TakenBy(one.role, one.view)] = [
+            path for upload in one.uploads for path in _pictures(given, upload)
+        ]
+    lossy = [
+        TakenBy(one.role, one.view) for one in new.pictures if "jpeg" in map(given.uploads.kind, one.uploads)
     ]
     told = Conditions(new.ambient_temperature_k)
     taken = import_files(found, files, new.bits, told, lossy=lossy)
@@ -86,7 +86,8 @@ def import_captures(given: Given, experiment: Identifier, new: NewImport) -> lis
         for upload in one.uploads:
             given.uploads.delete(upload)
     given.ledger.append_event("experiment", {"experiment": experiment, "changed": True})
-    return [_resource(burst.folder) for burst in taken if burst.folder is not None]
+    names = view_names(found)
+    return [capture_line(burst.folder, names) for burst in taken if burst.folder is not None]
 
 
 def _pictures(given: Services, upload: str) -> Sequence[Path]:
@@ -105,7 +106,8 @@ def list_captures(given: Given, experiment: Identifier) -> list[CaptureResource]
     desk = given.desk.status
     if desk.state is DeskState.running and desk.experiment == experiment:
         broken = [folder for folder in broken if folder.name != desk.capture]
-    return [_line(folder) for folder in done] + [_bare(folder, "interrupted") for folder in broken]
+    names = _names(given, experiment)
+    return [capture_line(folder, names) for folder in (*done, *broken)]
 
 
 @router.get("/experiments/{experiment}/captures/{capture}")
@@ -113,7 +115,7 @@ def read_capture(
     given: Given, experiment: Identifier, capture: Identifier, response: Response
 ) -> CaptureResource:
     """Return one capture."""
-    found = _resource(given.folders.item(experiment, "capture", capture))
+    found = capture_resource(given.folders.item(experiment, "capture", capture), _names(given, experiment))
     response.headers.update(etag(found.revision))
     return found
 
@@ -130,11 +132,12 @@ def change_capture(
     """Write notes beside a capture."""
     with given.folders.locked(experiment):
         folder = given.folders.item(experiment, "capture", capture)
-        before = _resource(folder)
+        names = _names(given, experiment)
+        before = capture_resource(folder, names)
         current = {"revision": before.revision, "notes": before.notes}
         check_revision(if_match, current, change.model_dump())
         write_text(folder / NOTES, change.notes)
-        found = _resource(folder)
+        found = capture_resource(folder, names)
     response.headers.update(etag(found.revision))
     return found
 
@@ -160,23 +163,41 @@ def read_picture(
     capture: Identifier,
     width: Annotated[int, Query(ge=16, le=4096, description="At most so many columns.")] = 320,
     what: Annotated[Literal["mean", "std"], Query()] = "mean",
+    view: ViewNumber = 0,
 ) -> Response:
     """Return a small picture of the mean or of the noise."""
-    image = _image(given, experiment, capture)
+    image = _image(given, experiment, capture, view)
     return Response(_png(image.mean if what == "mean" else image.std, width), media_type="image/png")
 
 
 @router.get("/experiments/{experiment}/captures/{capture}/image", response_class=Response, responses=NUMBERS)
 def read_image(
-    given: Given, experiment: Identifier, capture: Identifier, encoding: Encoding = "f32"
+    given: Given,
+    experiment: Identifier,
+    capture: Identifier,
+    encoding: Encoding = "f32",
+    view: ViewNumber = 0,
 ) -> Response:
     """Return the mean image as numbers, as fractions of full scale."""
-    packed = pack(_image(given, experiment, capture).mean, encoding)
+    packed = pack(_image(given, experiment, capture, view).mean, encoding)
     return Response(packed.content, media_type="application/octet-stream", headers=packed.headers)
 
 
-def _image(given: Services, experiment: str, capture: str) -> BurstImage:
-    return load_capture(given.folders.item(experiment, "capture", capture)).images[0]
+def _image(given: Services, experiment: str, capture: str, view: int) -> BurstImage:
+    images = load_capture(given.folders.item(experiment, "capture", capture)).images
+    if view >= len(images):
+        raise ApiError(
+            "not_found", f"The capture {capture!r} has {len(images)} views; there is no view {view}."
+        )
+    return images[view]
+
+
+def _names(given: Services, experiment: str) -> tuple[str, ...]:
+    """What the views are called; nothing where experiment.toml cannot be read: captures are listed all the same."""
+    try:
+        return view_names(given.folders.open(experiment))
+    except BadInputError:
+        return ()
 
 
 def _png(image: np.ndarray, width: int) -> bytes:
@@ -187,62 +208,3 @@ def _png(image: np.ndarray, width: int) -> bytes:
     shown = np.clip((small - low) * (255.0 / max(high - low, 1e-9)), 0, 255).astype(np.uint8)
     done, encoded = cv2.imencode(".png", shown)
     return encoded.tobytes() if done else b""
-
-
-def _line(folder: Path) -> CaptureResource:
-    try:
-        return _resource(folder)
-    except BadInputError as error:
-        return _bare(folder, "broken", str(error))
-
-
-def _resource(folder: Path) -> CaptureResource:
-    manifest = read_manifest(folder)
-    with reading(folder / "manifest.json", "Discard the capture, or restore it from a copy."):
-        return _shown(folder, manifest)
-
-
-def _shown(folder: Path, manifest: dict[str, Any]) -> CaptureResource:
-    view = manifest["views"][0]
-    camera = view.get("camera", {})
-    return CaptureResource(
-        capture=folder.name,
-        state="finished" if manifest.get("complete", True) else "incomplete",
-        role=manifest["role"],
-        created=manifest.get("created"),
-        frames=view.get("frames"),
-        width_px=camera.get("width_px"),
-        height_px=camera.get("height_px"),
-        verdicts=[VerdictResource(**_float(one, "value")) for one in view.get("verdicts", [])],
-        settings=[SettingResource(**_float(one, "granted")) for one in view.get("settings", [])],
-        notes=_notes(folder),
-        revision=revision_of(_notes(folder).encode()),
-        sequence=manifest.get("origin", {}).get("sequence", {}).get("id"),
-    )
-
-
-def _float(content: dict[str, Any], name: str) -> dict[str, Any]:
-    """JSON writes 1.0 as 1 or 1.0 as its writer likes; ours is a float."""
-    return content if content[name] is None else {**content, name: float(content[name])}
-
-
-def _bare(folder: Path, state: Literal["interrupted", "broken"], reason: str = "") -> CaptureResource:
-    return CaptureResource(
-        capture=shown_name(folder),
-        state=state,
-        role=None,
-        created=None,
-        frames=None,
-        width_px=None,
-        height_px=None,
-        verdicts=[],
-        settings=[],
-        notes=_notes(folder),
-        revision=revision_of(_notes(folder).encode()),
-        reason=reason,
-    )
-
-
-def _notes(folder: Path) -> str:
-    path = folder / NOTES
-    return path.read_bytes().decode("utf-8", "replace") if path.is_file() else ""

@@ -16,6 +16,7 @@ from app.api.models.experiments import (
     MarksModel,
     NewExperiment,
     NextResource,
+    SeenWallLine,
 )
 from app.api.services import Given, Services
 from app.api.wire.board import board_settings
@@ -118,6 +119,7 @@ def _line_or_reason(given: Services, folder: Path) -> ExperimentLine:
             results=0,
             changed=_changed(folder),
             revision="",
+            views=[],
             reason=str(error) or "It cannot be read.",
         )
 
@@ -146,6 +148,7 @@ def _line(experiment: Experiment) -> ExperimentLine:
         changed=_changed(experiment.folder),
         revision=experiment.revision,
         next=_next(experiment),
+        views=[SeenWallLine(name=view.name, wall=view.wall) for view in settings.scene.views],
     )
 
 

@@ -5,7 +5,8 @@ import time
 
 import pytest
 
-from app.capture.burst import BurstWatch, Order, interruptible, take, take_order
+from app.capture.burst import Order, interruptible, take, take_order
+from app.capture.watched import BurstWatch
 from app.experiment.captures import load_capture
 from app.experiment.folder import ExperimentSettings, create_experiment
 from app.rig.frame_report import judge_frame, write_picture

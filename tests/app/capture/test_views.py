@@ -1,5 +1,6 @@
 """An experiment with two views: simulated, captured in turn, and reconstructed by every door's own function."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,12 +8,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from app.capture.burst import BurstWatch, take
+from app.capture.burst import take
+from app.capture.watched import BurstWatch
 from app.cli import create_cli
 from app.errors import BadInputError
 from app.experiment.captures import load_capture, newest_pair
 from app.experiment.folder import open_experiment
 from app.experiment.rig_settings import V4l2CameraSettings
+from app.files.provenance import sha256
 from app.pipeline import reconstruct
 from app.rig.open import air_of, named_camera, open_camera
 from drivers.burst import CapturePlan
@@ -63,25 +66,76 @@ def test_both_views_are_measured_and_the_room_is_found(folder):
     assert np.isfinite(done.solution.temperature_k).all()
 
 
-def test_a_camera_that_fails_in_its_turn_leaves_no_measurement(folder, monkeypatch):
-    experiment = open_experiment(folder)
-    before = experiment.latest_capture("reference")
-    opened = open_camera
+def without_the_second(monkeypatch):
+    """The second camera does not answer."""
 
     def broken(experiment, air, view=0, moment=None):
         if view == 1:
             raise BadInputError("The second camera does not answer.")
-        return opened(experiment, air, view, moment)
+        return open_camera(experiment, air, view, moment)
 
-    monkeypatch.setattr("app.capture.burst.open_camera", broken)
-    begun: list[Path] = []
-    with (
-        open_camera(experiment, "still") as camera,
-        pytest.raises(BadInputError, match="second camera"),
-    ):
-        take(camera, experiment, CapturePlan(frames=2), watch=BurstWatch(begun=begun.append))
+    monkeypatch.setattr("app.capture.views.open_camera", broken)
+
+
+def run(*arguments):
+    return CliRunner().invoke(create_cli(), [str(one) for one in arguments])
+
+
+def test_a_camera_that_fails_in_its_turn_leaves_no_measurement_and_is_taken_alone(folder, monkeypatch):
+    experiment = open_experiment(folder)
+    before = experiment.latest_capture("reference")
+    with monkeypatch.context() as patch, open_camera(experiment, "still") as camera:
+        without_the_second(patch)
+        taken = take(camera, experiment, CapturePlan(frames=3))
+    assert "lacks the pictures of 'camera at x_max'" in taken.shortfall
+    assert "does not answer" in taken.shortfall
+    assert "airlens capture retake" in taken.shortfall
     assert experiment.latest_capture("reference") == before
-    assert begun[0].is_dir() is False or not (begun[0] / "manifest.json").exists()
+    kept = taken.folder
+    assert kept is not None
+    assert [path.name for path in sorted(kept.glob("*.*"))] == [
+        "incomplete.json",
+        "part-0.json",
+        "reference.tif",
+    ]
+
+    # The one that is missing, alone; the other camera's picture is the one that was kept.
+    whole = sha256(kept / "reference.tif")
+    done = run("capture", "retake", folder)
+    assert done.exit_code == 0, done.output
+    assert experiment.latest_capture("reference") == kept
+    capture = load_capture(kept)
+    assert capture.complete
+    assert [image.frames for image in capture.images] == [3, 3]
+    assert [one["view"] for one in capture.manifest["views"]] == ["camera", "camera at x_max"]
+    assert capture.manifest["views"][0]["sha256"] == whole
+    assert not list(kept.glob("part-*"))
+
+
+def test_one_camera_of_a_whole_capture_is_taken_again_into_a_new_one(folder):
+    experiment = open_experiment(folder)
+    with open_camera(experiment, "still") as camera:
+        first = take(camera, experiment, CapturePlan(frames=2)).folder
+    assert first is not None
+    unnamed = run("capture", "retake", folder)
+    assert "has 2 views: 'camera', 'camera at x_max'" in str(unnamed.exception)
+    unknown = run("capture", "retake", folder, "--view", "left")
+    assert "no view 'left'; its views are 'camera', 'camera at x_max'" in str(unknown.exception)
+    before = (first / "manifest.json").read_bytes()
+    assert run("capture", "retake", folder, "--view", "camera at x_max").exit_code == 0
+    again = experiment.latest_capture("reference")
+    assert again != first
+    assert (first / "manifest.json").read_bytes() == before
+    assert sha256(again / "reference.tif") == sha256(first / "reference.tif")
+    assert load_capture(again).manifest["origin"]["retaken"] == {"view": "camera at x_max", "of": first.name}
+
+
+def test_a_view_of_a_sequence_that_is_whole_is_not_taken_alone(folder, tmp_path):
+    copy = tmp_path / "room"
+    shutil.copytree(folder, copy)
+    assert run("capture", "flow", copy, "--frames", 2, "--bursts", 2, "--every-s", 60).exit_code == 0
+    done = run("capture", "retake", copy, "--view", "camera")
+    assert "belong together" in str(done.exception)
 
 
 def test_a_burst_that_is_stopped_in_the_first_view_is_no_measurement(folder):

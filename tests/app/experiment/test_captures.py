@@ -11,7 +11,8 @@ import pytest
 
 from app.errors import AirlensError, BadInputError
 from app.experiment.capture_files import BurstImage, read_image, read_raw_stack, write_image
-from app.experiment.captures import CaptureRecorder, load_capture, write_capture
+from app.experiment.captures import load_capture, write_capture
+from app.experiment.recorder import CaptureRecorder
 from app.files.disk_space import check_room
 from app.files.provenance import sha256
 from drivers.burst import CapturePlan
@@ -54,7 +55,7 @@ def test_the_raw_stack_holds_every_frame_that_is_in_the_mean(tmp_path):
     plan = CapturePlan(frames=5, raw_stack=True)
     recorder = CaptureRecorder(tmp_path / "raw", plan)
     burst = run_capture(make_camera(), plan, on_frame=recorder.observe)
-    recorder.keep([burst])
+    recorder.keep(burst)
 
     frames, records = read_raw_stack(tmp_path / "raw" / "frames.tif")
 
@@ -66,7 +67,7 @@ def test_a_lost_camera_leaves_a_readable_capture_that_is_no_measurement(tmp_path
     plan = CapturePlan(frames=40)
     recorder = CaptureRecorder(tmp_path / "lost", plan)
     camera = make_camera(faults={20: CameraFault.UNPLUG}.get)
-    recorder.keep([run_capture(camera, plan, on_frame=recorder.observe)])
+    recorder.keep(run_capture(camera, plan, on_frame=recorder.observe))
 
     capture = load_capture(tmp_path / "lost")
 
@@ -87,7 +88,7 @@ def test_discard_leaves_nothing(tmp_path):
 KILLED = """
 import sys
 from pathlib import Path
-from app.experiment.captures import CaptureRecorder
+from app.experiment.recorder import CaptureRecorder
 from drivers.burst import CapturePlan
 from drivers.capture import run_capture
 from drivers.simulated import SimulatedCamera

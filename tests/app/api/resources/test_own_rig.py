@@ -1,6 +1,7 @@
 """Doors of a lab's own rig: found cameras, ports, uploaded rooms, pictures of other cameras, prints."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -9,6 +10,7 @@ import pytest
 import tifffile
 
 from app.client import Client, ServiceError
+from app.experiment.folder import open_experiment, save_settings
 from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.file import read_volume
 from tests.app.api.conftest import Live
@@ -101,6 +103,34 @@ def test_dropped_pictures_become_captures_as_import_makes_them(client: Client, l
     mean = client.capture_image(made, taken[0].capture)
     np.testing.assert_allclose(mean, np.mean(pictures((48, 64), 0), axis=0) / 4095, atol=1e-6)
     assert client.uploads() == [] or not {one.upload for one in client.uploads()} & {*sent["flow"]}
+
+
+def test_pictures_of_two_cameras_are_one_capture_once_both_are_there(
+    client: Client, live: Live, tmp_path: Path
+):
+    made = client.create_experiment(camera_px=64).experiment
+    found = open_experiment(live.app.state.services.folders.folder(made))
+    (first,) = found.settings.scene.views
+    scene = replace(found.settings.scene, views=(first, replace(first, name="second")))
+    save_settings(found.folder, found.settings.model_copy(update={"scene": scene}))
+    assert [one.name for one in client.experiment(made).views] == ["camera", "second"]
+    uploads = []
+    for shift in (0, 1):
+        path = tmp_path / f"{shift}.tif"
+        tifffile.imwrite(path, np.stack(pictures((48, 64), shift)), photometric="minisblack")
+        uploads.append(client.upload(path).upload)
+    with pytest.raises(ServiceError, match="2 views: 'camera', 'second'"):
+        client.import_captures(made, {"reference": uploads[:1]})
+    (waiting,) = client.import_captures(made, {"reference": uploads[:1]}, view="second")
+    assert (waiting.state, waiting.role, waiting.missing) == ("interrupted", "reference", ["camera"])
+    assert [one.view for one in waiting.views] == ["second"]
+    (whole,) = client.import_captures(made, {"reference": uploads[1:]}, view="camera")
+    assert (whole.capture, whole.state, whole.missing) == (waiting.capture, "finished", [])
+    assert [(one.view, one.frames) for one in whole.views] == [("camera", 4), ("second", 4)]
+    mean = client.capture_image(made, whole.capture, view=1)
+    np.testing.assert_allclose(mean, np.mean(pictures((48, 64), 0), axis=0) / (2**16 - 1), atol=1e-6)
+    with pytest.raises(ServiceError, match="has 2 views"):
+        client.capture_image(made, whole.capture, view=2)
 
 
 def test_pictures_of_a_wrong_size_are_refused_with_both_sizes_and_jpeg_is_said_to_cost(
