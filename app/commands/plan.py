@@ -45,10 +45,15 @@ def plan(
 
 def show(made: "Plan") -> None:
     """The plan as a person reads it."""
+    from core.plan.signal import VISIBLE
+    from core.plan.verdicts import BLIND
+
     console = Console()
     console.print(f"Expected: {made.expected}; departures of {made.expected_departure_k:.2g} K rms.\n")
-    for sentence in made.verdicts:
-        console.print(f"- {sentence}", highlight=False)
+    best = max(view.picture_signal_to_noise for view in made.views)
+    first = "bold red" if best < BLIND else "bold yellow" if best < VISIBLE else "bold"
+    for place, sentence in enumerate(made.verdicts):
+        console.print(f"- {sentence}", highlight=False, style=first if place == 0 else None)
     console.print(_presets(made))
     console.print(f"Times: {made.machine}.\n", highlight=False)
     console.print(_choices(made))

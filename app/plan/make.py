@@ -37,7 +37,7 @@ from core.plan.observability import seen
 from core.plan.places import place_map
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import Signal, other_light, shift_map, signal
-from core.plan.verdicts import blindness, broken, moving, verdict
+from core.plan.verdicts import blindness, broken, in_short, moving, verdict
 from core.problem import Problem
 from core.scene import Scene
 from core.view_frame import facing, turn_of
@@ -82,6 +82,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
         presets=preset_lines(problem, flow),
         machine=source(),
         verdicts=[
+            in_short(max(view.picture_signal_to_noise for view in views)),
             *(
                 verdict(problem.scene, n, flow, s, view.other_light_shift_p99_px)
                 for n, (s, view) in enumerate(zip(signals, views, strict=True))

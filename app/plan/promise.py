@@ -175,7 +175,9 @@ def in_words(seconds: float) -> str:
     """A time as a person says it."""
     if seconds < 120:
         return f"{max(1, round(seconds))} s"
-    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"
+    if seconds < 7200:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.0f} h" if seconds < 172_800 else f"{seconds / 86_400:.0f} days"
 
 
 def _nearest(task: Task, runs: tuple[Run, ...]) -> tuple[Run, ...]:

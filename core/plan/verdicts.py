@@ -14,9 +14,24 @@ from core.rays.visibility import hidden_by_objects, sees_wall
 from core.scene import ProjectedPattern, Scene
 from core.view_frame import facing, turn_of
 
+# Below this a picture's signal is less than its noise, all windows together.
+BLIND = 1.0
 _SAME_PLACE_M = 0.01
 # Places of the picture, an axis, where the wall is looked for; a share of the wall that is much to hide.
 _PROBES, _TOO_MUCH = 64, 0.4
+
+
+def in_short(picture_snr: float) -> str:
+    """One sentence before all others: whether the picture as a whole shows the expected air."""
+    times = f"the picture as a whole shows it {picture_snr:.2g} times as strongly as its noise"
+    if picture_snr < BLIND:
+        return (
+            f"This rig does not see the expected air: {times}. What it would find comes from what is stated of the "
+            "room. Change the rig before you capture."
+        )
+    if picture_snr < VISIBLE:
+        return f"This rig sees the expected air weakly: {times}. Much of the rest comes from what is stated."
+    return f"This rig sees the expected air: {times}."
 
 
 def verdict(scene: Scene, view: int, flow: ExpectedFlow, found: Signal, other_p99_px: float) -> str:
@@ -52,7 +67,7 @@ def _verdict(scene: Scene, view: int, flow: ExpectedFlow, found: Signal, other_p
             "Move the projector at least 1 m away, or print the pattern."
         )
     seen = (
-        f"{name}: the pattern would move by {size:.2g} px (99th percentile), {found.snr:.2g} times the noise of a "
+        f"{name}: the pattern would move by up to {size:.2g} px, {found.snr:.2g} times the noise of a "
         f"window ({found.noise.mean_px:.2g} px from {frames} frames)"
     )
     if found.snr >= VISIBLE:

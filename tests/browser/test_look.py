@@ -224,16 +224,20 @@ def test_what_was_found_goes_to_the_rooms_editor_by_one_click(station: Station, 
     box = RoomObject(name="found 1", lower_m=(0.5, -0.5, 0.0), upper_m=(0.9, -0.1, 1.2))
     sentence = "Something that the scene does not state hides 3.0 % of the wall."
     thing = Found(0, 0.03, (0.4, 1.0), (0.0, 1.2), (10.0, 20.0, 30.0, 40.0), "seen", box, True, sentence)
-    for one in (without, name):
+    second = dataclasses.replace(thing, box=dataclasses.replace(box, name="found 2"), sentence="Another one.")
+    for one, things in ((without, (thing,)), (name, (thing, second))):
         experiment = folders.open(one)
         keep(experiment, "20260101T000000-standard", room(), "standard", 1.0)
         folder = experiment.results_folder / "20260101T000000-standard"
-        write_manifest(folder, read_manifest(folder) | {"found": to_plain((thing,))})
+        write_manifest(folder, read_manifest(folder) | {"found": to_plain(things)})
     watched = opens(f"{station.address}")
     page = watched.page
     page.get_by_label("Experiment").select_option(name)
     page.get_by_role("button", name="Look", exact=True).click()
-    expect(page.locator("main")).to_contain_text(sentence)
+    # Several are told in one line, so that the room comes first.
+    expect(page.get_by_text(sentence)).to_be_hidden()
+    page.get_by_text("2 things stand before the wall that the scene does not state").click()
+    expect(page.get_by_text(sentence)).to_be_visible()
     snapshot(page, "look-found")
     page.get_by_role("button", name="Add what stands here: found 1").click()
     group = page.get_by_role("group", name="object 1")

@@ -16,6 +16,10 @@ def test_a_plan_says_what_would_be_seen_and_what_each_preset_would_cost(station:
     expect(page.get_by_text("No plan yet")).to_be_visible()
     page.locator("main form").get_by_role("button", name="Plan").click()
     expect(page.locator(".verdicts li").first).to_be_visible(timeout=200_000)
+    # One verdict first, in the colour of what it says.
+    sight = page.locator(".verdicts").get_attribute("data-sight")
+    words = {"blind": "does not see", "weak": "weakly", "sees": "sees the expected air: "}
+    expect(page.locator(".verdicts li").first).to_contain_text(words[str(sight)])
     canvas = page.locator(".shiftmap canvas")
     expect(canvas).to_have_attribute("data-painted", "1")
     canvas.hover()

@@ -170,4 +170,10 @@ def test_a_kept_plan_is_shown_with_the_times_of_now(figures):
 
 
 def test_times_are_said_as_people_say_them():
-    assert [in_words(s) for s in (0.2, 40.4, 150.0, 9000.0)] == ["1 s", "40 s", "2 min", "2 h"]
+    assert [in_words(s) for s in (0.2, 40.4, 150.0, 9000.0, 9.9e5)] == [
+        "1 s",
+        "40 s",
+        "2 min",
+        "2 h",
+        "11 days",
+    ]

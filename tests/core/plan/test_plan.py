@@ -12,7 +12,7 @@ from core.plan.expected import expected_flow
 from core.plan.observability import seen
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import signal
-from core.plan.verdicts import verdict
+from core.plan.verdicts import in_short, verdict
 from core.problem import Problem
 from core.render import render_flow, render_reference
 from core.scene import Inlet, Outlet, Patch, Scene, Wall
@@ -29,6 +29,14 @@ def planned(scene: Scene, excess_k: float = 10.0):
     problem = Problem(scene, ())
     flow = expected_flow(problem, excess_k)
     return problem, flow, signal(scene, 0, flow, shift_noise(scene, 0, WINDOW_PX))
+
+
+@pytest.mark.parametrize(
+    ("picture_snr", "words"),
+    [(0.3, "does not see the expected air"), (2.1, "weakly"), (12.0, "sees the expected air: ")],
+)
+def test_the_first_sentence_says_whether_the_picture_as_a_whole_shows_the_air(picture_snr, words):
+    assert words in in_short(picture_snr)
 
 
 def test_the_noise_is_predicted_within_a_fifth():
