@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from app.client import Client
-from app.experiment.folder import Experiment, read_manifest, write_manifest
+from app.experiment.folder import Experiment, read_manifest, save_settings, write_manifest
 from app.experiment.found import Found
 from app.experiment.results import write_result
 from app.files.durable import write_json, write_text
@@ -19,6 +19,7 @@ from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.file import read_volume
 from core.objects import RoomObject
 from core.result import Departures, Outcome, Solution
+from core.scene import PointSensors
 from tests.browser.conftest import Opens, Station, snapshot
 
 PAINTED = re.compile(r"\d+")
@@ -347,4 +348,38 @@ def test_pointing_a_link_and_a_film(station: Station, opens: Opens):
         page.get_by_role("button", name="Keep a film").click()
     # WebM is Matroska: EBML's first bytes.
     assert Path(download.value.path()).read_bytes().startswith(b"\x1a\x45\xdf\xa3")
+    assert watched.complaints == []
+
+
+def test_profiles_over_the_height_stand_beside_the_truth_and_the_sensors(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=64).experiment
+    experiment = station.app.state.services.folders.open(name)
+    found = room()
+    keep(experiment, "20260101T000000-standard", found, "standard", 1.0)
+    watched = opens(station.address)
+    page = watched.page
+    page.get_by_role("button", name="Look", exact=True).click()
+    pole = page.locator(".profiles figure")
+    expect(pole).to_have_count(3)
+    expect(pole.locator("path.truth")).to_have_count(3)
+    # JavaScript rounds halves upwards.
+    i, j = (int(share * (len(x) - 1) + 0.5) for share, x in ((0.25, found.x_m), (0.5, found.y_m)))
+    floor_c = float(found.temperature_k[i, j, 1]) - 273.15
+    said = pole.first.locator("svg").get_attribute("aria-label")
+    expect(pole.first.locator("path.found")).to_be_visible()
+    assert f"{floor_c:.2f} °C at the floor" in str(said)
+
+    (experiment.folder / "sensors.csv").write_text(
+        "x,y,z,T,T_std\n0.5,0,0.5,296.5,0.1\n0.5,0,1.5,299.5,0.1\n"
+    )
+    scene = experiment.settings.scene
+    known = (*scene.boundary, PointSensors(file="sensors.csv"))
+    stated = experiment.settings.model_copy(update={"scene": dataclasses.replace(scene, boundary=known)})
+    save_settings(experiment.folder, stated)
+    page.reload()
+    page.get_by_role("button", name="Look", exact=True).click()
+    expect(pole).to_have_count(1)
+    expect(pole.locator("circle.sensor")).to_have_count(2)
+    snapshot(page, "look-profiles")
     assert watched.complaints == []
