@@ -260,35 +260,43 @@ class Client:
         """Return what a finished job of kind `places` found: the signal from other places of the camera."""
         return self._ask(PlacesLine, "GET", f"/jobs/{job}/places")
 
-    def guide(self, experiment: str, step: StepText = "camera") -> GuideResource:
-        """Return what a guided calibration wants next, and how good it is."""
+    def guide(self, experiment: str, step: StepText = "camera", view: str | None = None) -> GuideResource:
+        """Return what a guided calibration wants next, and how good it is; `view` names the camera, of several."""
         path = f"/experiments/{experiment}/calibration/guide"
-        return self._ask(GuideResource, "GET", path, query={"step": step})
+        return self._ask(GuideResource, "GET", path, query=_of_camera(step, view))
 
     def take_guided(self, experiment: str, step: StepText = "camera", **how: Any) -> GuideResource:
         """Take the pictures of what is wanted; `how` are the fields of GuideRequest."""
         path = f"/experiments/{experiment}/calibration/guide"
         return self._ask(GuideResource, "POST", path, {"step": step, **how})
 
-    def skip_guided(self, experiment: str, step: StepText = "camera") -> GuideResource:
+    def skip_guided(
+        self, experiment: str, step: StepText = "camera", view: str | None = None
+    ) -> GuideResource:
         """Do without what is wanted."""
         path = f"/experiments/{experiment}/calibration/guide/skip"
-        return self._ask(GuideResource, "POST", path, {"step": step})
+        return self._ask(GuideResource, "POST", path, {"step": step, "view": view})
 
-    def stop_guided(self, experiment: str, step: StepText = "camera") -> GuideResource:
+    def stop_guided(
+        self, experiment: str, step: StepText = "camera", view: str | None = None
+    ) -> GuideResource:
         """Stop taking pictures; those taken are kept."""
         path = f"/experiments/{experiment}/calibration/guide/stop"
-        return self._ask(GuideResource, "POST", path, query={"step": step})
+        return self._ask(GuideResource, "POST", path, query=_of_camera(step, view))
 
-    def retake_view(self, experiment: str, view: str, step: StepText = "camera") -> GuideResource:
-        """Forget a view, so that it is asked for again."""
+    def retake_view(
+        self, experiment: str, view: str, step: StepText = "camera", camera: str | None = None
+    ) -> GuideResource:
+        """Forget a view of the board, so that it is asked for again."""
         path = f"/experiments/{experiment}/calibration/views/{view}"
-        return self._ask(GuideResource, "DELETE", path, query={"step": step})
+        return self._ask(GuideResource, "DELETE", path, query=_of_camera(step, camera))
 
-    def discard_guided(self, experiment: str, step: StepText = "camera") -> GuideResource:
+    def discard_guided(
+        self, experiment: str, step: StepText = "camera", view: str | None = None
+    ) -> GuideResource:
         """Forget what a step has taken and not completed."""
         path = f"/experiments/{experiment}/calibration/guide"
-        return self._ask(GuideResource, "DELETE", path, query={"step": step})
+        return self._ask(GuideResource, "DELETE", path, query=_of_camera(step, view))
 
     def captures(self, experiment: str) -> list[CaptureResource]:
         """List the captures of an experiment."""
@@ -559,6 +567,10 @@ class Client:
         answer = self._http.get(path, params=query)
         _check(answer)
         return answer
+
+
+def _of_camera(step: StepText, view: str | None) -> dict[str, str]:
+    return {"step": step} if view is None else {"step": step, "camera": view}
 
 
 def _read(kind: type[T], answer: httpx.Response) -> T:

@@ -1,6 +1,7 @@
 """Where an experiment stands, and what comes next: the one rule, for `airlens status` and for `airlens` alone."""
 
 import contextlib
+import shlex
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -139,9 +140,11 @@ def _of_the_calibration(experiment: Experiment, shown: str) -> Next | None:
     missing = _missing(experiment)
     if not missing:
         return None
-    return Next(
-        Step.calibrate, f"airlens calibrate {missing[0]} {shown}", f"not calibrated yet: {', '.join(missing)}"
-    )
+    command = f"airlens calibrate {missing[0]} {shown}"
+    lacking = next(part.lacking for part in parts_of(experiment) if part.step.value == missing[0])
+    if len(experiment.settings.scene.views) > 1 and lacking:
+        command += f" --view {shlex.quote(lacking[0])}"
+    return Next(Step.calibrate, command, f"not calibrated yet: {', '.join(missing)}")
 
 
 def _of_the_captures(experiment: Experiment, shown: str) -> Next | None:

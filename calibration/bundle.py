@@ -143,10 +143,21 @@ class ProjectorResponse:
 
 
 @dataclass(frozen=True)
-class Bundle:
-    """One calibration: cameras in the order of the scene's views, the projector, the wall, the responses.
+class FurtherView:
+    """What was calibrated with the camera of that name, which is not the scene's first: its projector and wall."""
 
-    `images` maps the name of each image used to its SHA-256; `ambient_temperature_k` and `minutes_on`
+    name: str
+    projector: CalibratedOptics | None = None
+    wall: CalibratedWall | None = None
+    projector_response: ProjectorResponse | None = None
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """One calibration: the cameras, the projector, the wall, the responses.
+
+    `projector`, `wall` and `projector_response` are those of the scene's first view; `further` holds those of the
+    others. `images` maps the name of each image used to its SHA-256; `ambient_temperature_k` and `minutes_on`
     say how warm room and devices were.
     """
 
@@ -158,6 +169,7 @@ class Bundle:
     projector_response: ProjectorResponse | None = None
     ambient_temperature_k: float | None = None
     minutes_on: float | None = None
+    further: tuple[FurtherView, ...] = ()
     images: dict[str, str] = field(default_factory=dict)
     units: str = "m, rad, px, counts, e, K"
     schema: int = SCHEMA
@@ -196,6 +208,30 @@ class Bundle:
         """The response of the camera called `name` (or the first one), if it was measured."""
         return next((r for r in self.camera_responses if name is None or r.name == name), None)
 
+    def of(self, camera: str, is_first: bool) -> "Bundle":
+        """What concerns one view: its camera, response, projector and wall, in the first view's places."""
+        own = (
+            self
+            if is_first
+            else next((one for one in self.further if one.name == camera), FurtherView(camera))
+        )
+        return dataclasses.replace(
+            self,
+            cameras=tuple(one for one in self.cameras if one.name == camera),
+            camera_responses=tuple(one for one in self.camera_responses if one.name == camera),
+            projector=own.projector,
+            wall=own.wall,
+            projector_response=own.projector_response,
+            further=(),
+        )
+
+    def with_view(self, camera: str, is_first: bool, **parts: Any) -> "Bundle":
+        """This bundle with parts of a view (projector, wall, projector_response) in place of those it had."""
+        if is_first:
+            return dataclasses.replace(self, **parts)
+        own = next((one for one in self.further if one.name == camera), FurtherView(camera))
+        return dataclasses.replace(self, further=_put(self.further, dataclasses.replace(own, **parts)))
+
     def with_camera(self, camera: CalibratedOptics) -> "Bundle":
         """This bundle with `camera` in place of its namesake, or added."""
         return dataclasses.replace(self, cameras=_put(self.cameras, camera))
@@ -212,6 +248,7 @@ def given_bundle(
     projector: Optics | None = None,
     noise: dict[str, CameraNoise] | None = None,
     back_wall_y_m: float | None = None,
+    further: tuple[FurtherView, ...] = (),
 ) -> Bundle:
     """A bundle of quality `given` from optics that are known, as a simulated rig's are.
 
@@ -226,6 +263,7 @@ def given_bundle(
         projector=None if projector is None else CalibratedOptics("projector", projector),
         wall=wall,
         camera_responses=tuple(given_response(name, n) for name, n in (noise or {}).items()),
+        further=further,
     )
 
 

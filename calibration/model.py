@@ -22,6 +22,7 @@ from calibration.record import Record, SeenBoard, array_of
 from calibration.vertical import level_of
 from calibration.wall import Correspondences, Plane
 from calibration.world import Anchor, WorldPose, difference, levelled, optics_in, world_of
+from core.view_frame import turn_to
 
 MINIMUM_VIEWS = 3
 
@@ -141,11 +142,17 @@ def _over(pose: np.ndarray) -> np.ndarray:
 
 
 def _world(record: Record, state: _State, up: np.ndarray) -> WorldPose:
-    if state.plane is None:
-        return levelled(state.devices[0])
+    """The camera in the room: found in the view's own frame, where its wall is y_max, and turned back."""
     place = record.placement
-    anchor = Anchor(place.x_m, place.z_m, place.wall_y_m, place.anchor_px)
-    return world_of(state.devices[0], state.plane.normal, state.plane.offset_m, up, anchor)
+    if state.plane is None:
+        found = levelled(state.devices[0])
+    else:
+        anchor = Anchor(place.x_m, place.z_m, place.wall_y_m, place.anchor_px)
+        found = world_of(state.devices[0], state.plane.normal, state.plane.offset_m, up, anchor)
+    turn = turn_to(place.wall)
+    if turn.is_none:
+        return found
+    return WorldPose(turn.matrix.T @ found.rotation, turn.matrix.T @ found.position_m)
 
 
 def _optics(record: Record, state: _State, up: np.ndarray, world: WorldPose) -> tuple[tuple, tuple | None]:

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from calibration import strict
 from calibration.errors import BundleError
 from calibration.views import BoardView
+from core.geometry import WallName
 
 Rows = tuple[tuple[float, ...], ...]
 
@@ -46,7 +47,9 @@ class SeenWall:
 class Placement:
     """How the world lies: a point of the wall with measured x and z, the wall's y, and the vertical.
 
-    `plumb_px` are two camera positions (u, v, u, v), lower and upper end of a vertical line on the wall.
+    `wall` is the room's wall that the camera looks at; x, y and z are those of the view's own frame, in which that
+    wall is y_max (`core.view_frame`). `plumb_px` are two camera positions (u, v, u, v), lower and upper end of a
+    vertical line on the wall.
     """
 
     anchor_px: tuple[float, float] | None = None
@@ -54,6 +57,7 @@ class Placement:
     z_m: float = 0.0
     wall_y_m: float | None = None
     plumb_px: tuple[float, float, float, float] | None = None
+    wall: WallName = "y_max"
 
 
 @dataclass(frozen=True)

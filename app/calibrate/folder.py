@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from urllib.parse import quote
 
 from app.experiment.calibration import read_bundle
 from app.experiment.folder import SETTINGS_FILE, ExperimentSettings, bundle_path, open_experiment
@@ -50,6 +51,21 @@ class CalibrationFolder:
         if not (self.experiment / SETTINGS_FILE).exists():
             return None
         return open_experiment(self.experiment).settings
+
+    def is_first(self, camera: str) -> bool:
+        """Whether that is the first view's camera, or that of a folder without a scene. Raises BadInputError."""
+        settings = self.settings()
+        return settings is None or settings.scene.views[0].name == camera
+
+    def live(self, what: str, camera: str) -> Path:
+        """The folder of the pictures that a guided step takes with a camera."""
+        return self.folder / (
+            f"live-{what}" if self.is_first(camera) else f"live-{what}-{_in_a_name(camera)}"
+        )
+
+    def flat_field(self, camera: str) -> Path:
+        """The file of a camera's flat field."""
+        return self.folder / f"flat-{_in_a_name(camera)}.tif"
 
     def bundle(self) -> Bundle:
         """The bundle so far; an empty one if there is none. Raises BadInputError."""
@@ -93,13 +109,13 @@ class CalibrationFolder:
         begun = self.started(camera) is step
         if begun:
             self.forget_started(camera)
-        kept, live = self.record(camera), self.folder / f"live-{step}"
+        kept, live = self.record(camera), self.live(step, camera)
         unused = [live]
         if step in (StepName.camera, StepName.projector):
             names = set() if kept is None else {b.name.split("/")[0] for b in kept.boards}
             unused = [path for path in live.glob("*") if path.name not in names]
         elif step is StepName.wall and (begun or kept is None or not (kept.wall or kept.level)):
-            unused = [live, self.folder / "live-level"]
+            unused = [live, self.live("level", camera)]
         elif step is StepName.wall or self.bundle().response(camera) is not None:
             unused = []
         for path in unused:
@@ -120,13 +136,13 @@ class CalibrationFolder:
 
         def change(old: Bundle) -> Bundle:
             others = {name: sha for name, sha in old.images.items() if sha not in images.values()}
-            return dataclasses.replace(
-                old.with_camera(model.camera_optics),
-                date=now(),
-                projector=model.projector_optics or old.projector,
-                wall=model.wall or old.wall,
-                images=others | images,
+            parts = {"projector": model.projector_optics, "wall": model.wall}
+            new = old.with_camera(model.camera_optics).with_view(
+                record.camera,
+                self.is_first(record.camera),
+                **{name: part for name, part in parts.items() if part is not None},
             )
+            return dataclasses.replace(new, date=now(), images=others | images)
 
         return self.change_bundle(change)
 
@@ -145,10 +161,15 @@ class CalibrationFolder:
         return bundle
 
     def _record_path(self, camera: str) -> Path:
-        return self.folder / f"record-{camera}.json"
+        return self.folder / f"record-{_in_a_name(camera)}.json"
 
     def _started_path(self, step: StepName, camera: str) -> Path:
-        return self.folder / f"started-{step}-{camera}.json"
+        return self.folder / f"started-{step}-{_in_a_name(camera)}.json"
+
+
+def _in_a_name(camera: str) -> str:
+    """A camera's name as part of a file's."""
+    return quote(camera, safe=" ()+,@")
 
 
 def _read_record(path: Path) -> Record:

@@ -28,6 +28,7 @@ from calibration.board import Board
 from calibration.graycode import frame_count
 from calibration.guide import CAMERA_PLAN, PROJECTOR_PLAN, WantedView, unmet
 from calibration.record import Placement, Record, SeenBoard
+from core.geometry import WallName
 from drivers.capture import Abort
 from drivers.settings import held
 
@@ -66,7 +67,7 @@ class GuidedCalibration:
     ) -> None:
         self._calibration, self._plan, self._stage = calibration, plan, stage
         self.skipped = skipped
-        self._folder = calibration.folder / f"live-{plan.step}"
+        self._folder = calibration.live(plan.step, plan.camera)
         self.issues: tuple[str, ...] = ()
         self._check()
 
@@ -187,7 +188,8 @@ class GuidedCalibration:
             tasks.append(
                 StageTask(
                     "level",
-                    "Light the room; hold the board flat against the wall, level, in the picture's middle.",
+                    f"Light the room; hold the board flat {_held(self._plan.placement.wall)}, in the "
+                    "picture's middle.",
                 )
             )
         return tasks
@@ -227,7 +229,7 @@ class GuidedCalibration:
         return self._used(lambda: self._projector(name))
 
     def _take_wall(self, task: StageTask, shooter: Shooter) -> tuple[str, ...]:
-        level = self._calibration.folder / "live-level" / "level.png"
+        level = self._calibration.live("level", self._plan.camera) / "level.png"
         if task.kind == "wall":
             shooter.gray_code(self._folder)
         else:
@@ -299,6 +301,15 @@ def _board_tasks(
     boards = () if record is None else tuple(b for b in record.boards if counts(b))
     left = list(plan) if record is None else unmet(plan, boards, record.camera_size_px)
     return [StageTask(kind, view.text, view) for view in left]
+
+
+def _held(wall: WallName) -> str:
+    """How a board is held level; on a ceiling or floor nothing is level, and the room's axes tell."""
+    flat = {
+        "z_max": "against the ceiling, its upper edge towards y_min",
+        "z_min": "on the floor, its upper edge towards y_max",
+    }
+    return flat.get(wall, "against the wall, level")
 
 
 def _next(folder: Path, stem: str) -> int:

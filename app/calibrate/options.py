@@ -7,7 +7,10 @@ from typing import Annotated
 import typer
 
 from app.calibrate.folder import CalibrationFolder
+from app.calibrate.placement import placed
 from app.errors import BadInputError
+from app.experiment.folder import open_experiment
+from app.experiment.views import view_names, view_number
 from app.rig.conditions import Conditions
 from calibration.board import Board, board_of
 from calibration.board_kind import BoardKind
@@ -24,7 +27,10 @@ Grid = Annotated[str, typer.Option("--grid", help="Inner corners, ChArUco square
 Square = Annotated[str, typer.Option("--square", help="Size of a square or spacing of circles: 75mm, 0.075.")]
 Marker = Annotated[str | None, typer.Option("--marker", help="Size of a ChArUco marker (0.75 of a square).")]
 Dictionary = Annotated[str, typer.Option("--dictionary", help="ChArUco dictionary.")]
-CameraName = Annotated[str, typer.Option("--camera", help="Which camera of the scene.")]
+CameraName = Annotated[
+    str | None,
+    typer.Option("--view", "--camera", help="Which view's camera, by its name, where there are several."),
+]
 Bits = Annotated[int | None, typer.Option("--bits", help="Bits of the camera, to see saturation.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Ambient = Annotated[
@@ -66,15 +72,14 @@ def make_board(kind: BoardKind, grid: str, square: str, marker: str | None, dict
 
 def make_placement(
     folder: CalibrationFolder,
+    camera: str,
     anchor: str | None,
     camera_at: str | None,
     wall_y: float | None,
     plumb_px: str | None,
 ) -> Placement:
-    """How the world lies, the wall's y from the experiment's room unless given. Raises BadInputError."""
+    """How the world lies, the wall's place from the experiment's room unless given. Raises BadInputError."""
     settings = folder.settings()
-    if wall_y is None and settings is not None:
-        wall_y = settings.scene.room.upper_m[1]
     if anchor is not None and camera_at is not None:
         raise BadInputError("Give --anchor or --camera-at, not both: each fixes the world's x and z.")
     line = None
@@ -82,15 +87,26 @@ def make_placement(
         a, b, c, d = numbers(plumb_px, 4, "--plumb-px", "640,900,642,120")
         line = (a, b, c, d)
     if anchor is not None:
-        u, v, x, z = numbers(anchor, 4, "--anchor", "640,512,1.5,1.2")
-        return Placement((u, v), x, z, wall_y, line)
-    if camera_at is not None:
-        x, z = numbers(camera_at, 2, "--camera-at", "1.5,1.2")
-    elif settings is not None:
-        x, _, z = settings.scene.views[0].camera.position_m
+        u, v, *across = numbers(anchor, 4, "--anchor", "640,512,1.5,1.2")
+        pixel = (u, v)
     else:
-        x, z = 0.0, 0.0
-    return Placement(None, x, z, wall_y, line)
+        across = None if camera_at is None else numbers(camera_at, 2, "--camera-at", "1.5,1.2")
+        pixel = None
+    if settings is not None:
+        return placed(settings.scene, camera, pixel, across, wall_y, line)
+    x, z = across or (0.0, 0.0)
+    return Placement(pixel, x, z, wall_y, line)
+
+
+def named_view(folder: CalibrationFolder, name: str | None) -> str:
+    """The camera that is meant: of one view its own; of pictures without a scene `camera` unless named.
+
+    Raises BadInputError for a name that no view has, and for none where there are several.
+    """
+    if folder.settings() is None:
+        return name or "camera"
+    experiment = open_experiment(folder.experiment)
+    return view_names(experiment)[view_number(experiment, name)]
 
 
 def panel_size(folder: CalibrationFolder, text: str | None) -> tuple[int, int]:

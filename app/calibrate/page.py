@@ -19,6 +19,7 @@ from calibration.errors import CalibrationError
 from calibration.intrinsics import Intrinsics
 from calibration.model import Model, build
 from calibration.sensitivity import shift_uncertainty
+from calibration.turned import turned
 from core.geometry import Optics
 
 
@@ -29,7 +30,7 @@ def fragment(calibration: CalibrationFolder, camera: str = "camera") -> str:
         raise BadInputError(
             f"{calibration.folder} holds no record of camera {camera!r}; run 'airlens calibrate camera' first."
         )
-    bundle = calibration.bundle()
+    bundle = calibration.bundle().of(camera, calibration.is_first(camera))
     parts = [
         f'<figure><img alt="{html.escape(title)}" src="{as_data_uri(figure)}">'
         f"<figcaption>{html.escape(title)}</figcaption></figure>"
@@ -65,8 +66,10 @@ def write_page(calibration: CalibrationFolder, camera: str = "camera") -> str:
 
 
 def figures(model: Model, bundle: Bundle) -> list[tuple[str, Figure]]:
-    """Titles and figures, each only where its data are known."""
+    """Titles and figures, each only where its data are known; `bundle` is that of the model's view."""
     record = model.record
+    # A camera of another wall is drawn in its own frame, in which that wall is the back one.
+    bundle = turned(bundle, record.placement.wall)
     found = [("Camera: residuals (enlarged) and coverage", _residuals(model.camera, record.camera_size_px))]
     if model.pair is not None and record.panel_size_px is not None:
         title = "Projector: residuals (enlarged) and coverage"

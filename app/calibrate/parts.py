@@ -13,25 +13,34 @@ PartState = Literal["measured", "given", "missing"]
 
 @dataclass(frozen=True)
 class Part:
-    """One step's outcome. A rig without a `needed` one is not calibrated; a response may stay nominal."""
+    """One step's outcome, of all views together. A rig without a `needed` one is not calibrated; a response may stay
+    nominal. `lacking` names the views in which it is missing.
+    """
 
     step: StepName
     state: PartState
     needed: bool = True
+    lacking: tuple[str, ...] = ()
 
 
 def parts_of(experiment: Experiment) -> tuple[Part, ...]:
     """Every part that this rig has, in the order in which they are calibrated. Raises BadInputError."""
-    bundle, scene = bundle_of(experiment), experiment.settings.scene
-    cameras = {camera.name: camera.quality for camera in bundle.cameras}
-    parts = [Part(StepName.camera, _state(*(cameras.get(view.name) for view in scene.views)))]
-    if isinstance(scene.light, ProjectedPattern):
-        projector = bundle.projector
-        parts.append(Part(StepName.projector, _state(None if projector is None else projector.quality)))
-    parts.append(Part(StepName.wall, _state(None if bundle.wall is None else bundle.wall.quality)))
-    responses = (bundle.response(view.name) for view in scene.views)
-    response = _state(*(None if one is None else one.quality for one in responses))
-    return (*parts, Part(StepName.response, response, needed=False))
+    scene = experiment.settings.scene
+    by_step: dict[StepName, dict[str, Quality | None]] = {step: {} for step in StepName}
+    for number, view in enumerate(scene.views):
+        own = bundle_of(experiment).of(view.name, number == 0)
+        response = own.response()
+        by_step[StepName.camera][view.name] = own.cameras[0].quality if own.cameras else None
+        if isinstance(view.light or scene.light, ProjectedPattern):
+            by_step[StepName.projector][view.name] = None if own.projector is None else own.projector.quality
+        by_step[StepName.wall][view.name] = None if own.wall is None else own.wall.quality
+        by_step[StepName.response][view.name] = None if response is None else response.quality
+    return tuple(_part(step, found) for step, found in by_step.items() if found)
+
+
+def _part(step: StepName, found: dict[str, Quality | None]) -> Part:
+    lacking = tuple(name for name, quality in found.items() if quality is None)
+    return Part(step, _state(*found.values()), step is not StepName.response, lacking)
 
 
 def is_calibrated(parts: tuple[Part, ...]) -> bool:

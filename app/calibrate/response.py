@@ -49,15 +49,17 @@ def calibrate_response(calibration: CalibrationFolder, camera: str, folder: Path
             levels = tuple(level / top for level in grey)
             projector = measure_projector(levels, tuple(grey.values()), response.dark_counts)
             flat = flat_field(grey[top], grey[min(grey)])
-            path = calibration.folder / f"flat-{camera}.tif"
+            path = calibration.flat_field(camera)
             write_durably(path, lambda temporary: tifffile.imwrite(temporary, flat))
             response = dataclasses.replace(response, flat_field=path.name)
     except CalibrationError as error:
         raise BadInputError(str(error)) from error
 
     def change(old: Bundle) -> Bundle:
-        curve = projector or old.projector_response
-        return dataclasses.replace(old.with_response(response), projector_response=curve, date=now())
+        new = old.with_response(response)
+        if projector is not None:
+            new = new.with_view(camera, calibration.is_first(camera), projector_response=projector)
+        return dataclasses.replace(new, date=now())
 
     return calibration.change_bundle(change)
 

@@ -17,6 +17,7 @@ from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.calibrate.pictures import CalibrationStoppedError
 from app.errors import AirlensError
 from app.experiment.folder import Experiment
+from app.experiment.views import view_number
 from app.rig.conditions import Conditions, conditions_of
 from app.rig.live_camera import LiveCamera
 from app.rig.open import open_camera, open_stage, panel_of
@@ -73,6 +74,7 @@ class GuideStatus:
     state: GuideState = GuideState.idle
     experiment: str | None = None
     step: StepName | None = None
+    camera: str | None = None
     wanted: StageTask | None = None
     done: int = 0
     total: int = 0
@@ -88,7 +90,7 @@ class CalibrationDesk:
     ) -> None:
         self._live, self._screen, self._tell = live, screen, tell
         self._status = GuideStatus()
-        self._skipped: dict[tuple[str, StepName], tuple[StageTask, ...]] = {}
+        self._skipped: dict[tuple[str, StepName, str], tuple[StageTask, ...]] = {}
         self._lock = threading.Lock()
         self._now: _Run | None = None
 
@@ -110,7 +112,10 @@ class CalibrationDesk:
             work = (run, experiment, plan, told)
             run.thread = threading.Thread(target=self._run, args=work, name="calibration", daemon=True)
             self._now = run
-            before, self._status = self._status, GuideStatus(state, experiment.folder.name, plan.step, task)
+            before, self._status = (
+                self._status,
+                GuideStatus(state, experiment.folder.name, plan.step, plan.camera, task),
+            )
             try:
                 run.thread.start()
             except RuntimeError:  # no more threads
@@ -125,7 +130,7 @@ class CalibrationDesk:
             self._free()
             guided = self._asked(experiment, plan)
             guided.skip()
-            self._skipped[experiment.folder.name, plan.step] = guided.skipped
+            self._skipped[experiment.folder.name, plan.step, plan.camera] = guided.skipped
             guided.finish()
         return guided.wanted()
 
@@ -142,7 +147,7 @@ class CalibrationDesk:
             self._free()
             name = experiment.folder.name
             CalibrationFolder(experiment.folder).discard(plan.step, plan.camera)
-            self._skipped.pop((name, plan.step), None)
+            self._skipped.pop((name, plan.step, plan.camera), None)
             self._status = GuideStatus(GUIDE.after(self._status.state, GuideEvent.discard))
             self._tell("calibration", {"experiment": name, "state": "discard", "step": plan.step.value})
 
@@ -169,12 +174,12 @@ class CalibrationDesk:
 
     def _asked(self, experiment: Experiment, plan: LivePlan) -> GuidedCalibration:
         """The guide without a device."""
-        panel = panel_of(experiment.settings.scene)
+        panel = panel_of(experiment.settings.scene, view_number(experiment, plan.camera))
         stage = UnopenedStage(None if panel is None else self._screen, panel)
         return self._guided(experiment, plan, stage)
 
     def _guided(self, experiment: Experiment, plan: LivePlan, stage: Stage) -> GuidedCalibration:
-        skipped = self._skipped.get((experiment.folder.name, plan.step), ())
+        skipped = self._skipped.get((experiment.folder.name, plan.step, plan.camera), ())
         return GuidedCalibration(CalibrationFolder(experiment.folder), plan, stage, skipped)
 
     def _run(self, run: "_Run", experiment: Experiment, plan: LivePlan, told: Conditions) -> None:
@@ -203,16 +208,17 @@ class CalibrationDesk:
     @contextmanager
     def _stage(self, experiment: Experiment, plan: LivePlan) -> Iterator[Stage]:
         """The rig, its camera also shown to whoever looks."""
-        name = experiment.folder.name
+        name, view = experiment.folder.name, view_number(experiment, plan.camera)
         if experiment.settings.rig.camera_kind == "simulated":
-            stage = open_stage(experiment, plan.board)
-            self._live.open(name, lambda: stage.camera, "practice")
+            stage = open_stage(experiment, plan.board, view=view)
+            self._live.open(name, lambda: stage.camera, "practice", view)
             with self._live.using():
                 yield stage
             return
-        if self._live.status.experiment != name or self._live.status.state.value != "ready":
-            self._live.open(name, lambda: open_camera(experiment, "still"))
-        panel = panel_of(experiment.settings.scene)
+        open_for = (self._live.status.experiment, self._live.view)
+        if open_for != (name, view) or self._live.status.state.value != "ready":
+            self._live.open(name, lambda: open_camera(experiment, "still", view), view=view)
+        panel = panel_of(experiment.settings.scene, view)
         with self._live.using() as camera:
             yield RealStage(camera, None if panel is None else self._screen, panel)
 

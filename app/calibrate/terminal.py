@@ -16,6 +16,7 @@ from app.calibrate.pictures import CalibrationStoppedError
 from app.calibrate.state import line_of
 from app.errors import BadInputError
 from app.experiment.folder import Experiment, open_experiment
+from app.experiment.views import view_number
 from app.rig.screens import open_screen
 from app.rig.stage import StageTask
 from drivers.display import PatternDisplay
@@ -41,8 +42,9 @@ def run_live(folder: Path, plan: LivePlan, options: LiveOptions) -> None:
 
     experiment = open_experiment(folder)
     calibration = CalibrationFolder(folder)
-    with _screen(experiment, options, plan.step) as display, interruptible() as stopped:
-        stage = open_stage(experiment, plan.board, display)
+    view = view_number(experiment, plan.camera)
+    with _screen(experiment, options, view) as display, interruptible() as stopped:
+        stage = open_stage(experiment, plan.board, display, view)
         with stage.camera:
             guided = GuidedCalibration(calibration, plan, stage)
             guided.resume()
@@ -115,12 +117,12 @@ class _Prompt:
 
 
 @contextlib.contextmanager
-def _screen(experiment: Experiment, options: LiveOptions, step: StepName) -> Iterator[PatternDisplay | None]:
+def _screen(experiment: Experiment, options: LiveOptions, view: int) -> Iterator[PatternDisplay | None]:
     """The real projector's screen, where the step needs one and the rig has it."""
     from app.rig.open import panel_of
 
     simulated = experiment.settings.rig.camera_kind == "simulated"
-    if simulated or panel_of(experiment.settings.scene) is None:
+    if simulated or panel_of(experiment.settings.scene, view) is None:
         yield None
         return
     with open_screen(options.screen, options.port, lambda text: typer.echo(text, err=True)) as display:

@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from app.capture.checks import judged
-from app.capture.views import bursts_of_views, together, view_names
+from app.capture.views import bursts_of_views, together
 from app.capture.watched import UNWATCHED, BurstWatch, run_watched
 from app.experiment.folder import Experiment, new_id
 from app.experiment.recorder import CaptureRecorder
+from app.experiment.views import view_names
 from app.files.disk_space import check_room
 from app.rig.conditions import UNTOLD, Conditions, conditions_of, known_pairs, seconds_on
 from app.rig.open import air_of, clock_of

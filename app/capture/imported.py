@@ -12,12 +12,12 @@ from typing import NamedTuple
 from app.capture.burst import TakenBurst, take
 from app.capture.checks import judged
 from app.capture.files import PictureFiles, picture_files
-from app.capture.views import view_names, view_number
 from app.capture.watched import UNWATCHED, BurstWatch, run_watched
 from app.errors import AirlensError, BadInputError
 from app.experiment.capture_parts import parts_of
 from app.experiment.folder import Experiment, interrupted, new_id
 from app.experiment.recorder import CaptureRecorder
+from app.experiment.views import view_names, view_number
 from app.files.lock import locked
 from app.rig.conditions import UNTOLD, Conditions, conditions_of, known_pairs
 from drivers.burst import BurstOutcome, CapturePlan, CaptureRole

@@ -10,12 +10,12 @@ from typing import Any
 
 from app.capture.burst import TakenBurst, origin_of
 from app.capture.checks import judged
-from app.capture.views import view_names, view_number
 from app.capture.watched import UNWATCHED, BurstWatch, run_watched
 from app.errors import BadInputError
 from app.experiment.capture_parts import CaptureParts, carry_over, parts_of
 from app.experiment.folder import Experiment, finished, new_id
 from app.experiment.recorder import CaptureRecorder
+from app.experiment.views import view_names, view_number
 from app.files.disk_space import check_room
 from app.rig.conditions import UNTOLD, Conditions, seconds_on
 from drivers.burst import BurstOutcome

@@ -226,11 +226,12 @@ class CaptureDesk:
     def _connect(self, experiment: Experiment, air: AirState) -> None:
         """Open the rig's camera unless it is; a simulated room is told what its air does."""
         source = experiment.folder.name
-        open_for = (self._live.status.experiment, self._live.air)
+        open_for = (self._live.status.experiment, self._live.air, self._live.view)
         simulated = experiment.settings.rig.camera_kind == "simulated"
         if self._live.status.state.value != "ready" or open_for != (
             source,
             air if simulated else self._live.air,
+            0,
         ):
             self._live.open(source, lambda: self._opener(experiment, air), air)
 

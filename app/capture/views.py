@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from app.capture.watched import BurstWatch, run_watched
-from app.errors import AirlensError, BadInputError
+from app.errors import AirlensError
 from app.experiment.folder import Experiment
+from app.experiment.views import view_names
 from app.rig.conditions import Conditions, seconds_on
 from app.rig.open import air_of, open_camera
 from drivers.burst import Burst, BurstOutcome, CapturePlan
@@ -21,26 +22,6 @@ class ViewBursts:
     bursts: Mapping[int, Burst]
     failed: Mapping[str, str]
     errors: tuple[Exception, ...] = field(default=(), repr=False)
-
-
-def view_names(experiment: Experiment) -> tuple[str, ...]:
-    """What the scene's views are called, in their order."""
-    return tuple(view.name for view in experiment.settings.scene.views)
-
-
-def view_number(experiment: Experiment, name: str | None) -> int:
-    """The number of the view called so; where there is one view it need not be named. Raises BadInputError."""
-    names = view_names(experiment)
-    if name is None and len(names) == 1:
-        return 0
-    known = ", ".join(repr(one) for one in names)
-    if name is None:
-        raise BadInputError(
-            f"{experiment.folder.name} has {len(names)} views: {known}. Say which one is meant, by its name."
-        )
-    if name not in names:
-        raise BadInputError(f"{experiment.folder.name} has no view {name!r}; its views are {known}.")
-    return names.index(name)
 
 
 def bursts_of_views(

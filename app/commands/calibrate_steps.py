@@ -35,6 +35,7 @@ from app.calibrate.options import (
     chosen_board,
     full_scale,
     make_placement,
+    named_view,
     needed_board,
     numbers,
     panel_size,
@@ -75,7 +76,7 @@ def camera(
     board: Kind = "chessboard",
     marker: Marker = None,
     dictionary: Dictionary = "DICT_5X5_250",
-    camera: CameraName = "camera",
+    view: CameraName = None,
     bits: Bits = None,
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
@@ -87,6 +88,7 @@ def camera(
 ) -> None:
     """Fit the camera to views of a board: live, or in pictures (of a Gray-code sequence, its white frame)."""
     folder = CalibrationFolder(experiment)
+    camera = named_view(folder, view)
     if discard:
         folder.discard(StepName.camera, camera)
         return
@@ -117,7 +119,7 @@ def projector(
     board: Kind = "chessboard",
     marker: Marker = None,
     dictionary: Dictionary = "DICT_5X5_250",
-    camera: CameraName = "camera",
+    view: CameraName = None,
     bits: Bits = None,
     white_first: Annotated[bool, typer.Option(help="White and black come first, not last.")] = False,
     ambient_temperature_k: Ambient = None,
@@ -133,6 +135,7 @@ def projector(
 ) -> None:
     """Fit camera and projector to Gray-code sequences on a board, one sequence for each place of it."""
     folder = CalibrationFolder(experiment)
+    camera = named_view(folder, view)
     if discard:
         folder.discard(StepName.projector, camera)
         return
@@ -165,16 +168,23 @@ def wall(
     marker: Marker = None,
     dictionary: Dictionary = "DICT_5X5_250",
     anchor: Annotated[
-        str | None, typer.Option(help="A wall point seen at U,V whose world X,Z [m] were measured: U,V,X,Z.")
+        str | None,
+        typer.Option(
+            help="A wall point seen at U,V whose room X,Z [m] were measured (of an x wall Y,Z; of a z wall X,Y)."
+        ),
     ] = None,
     camera_at: Annotated[
-        str | None, typer.Option(help="World X,Z [m] of the camera: X,Z (the scene's).")
+        str | None,
+        typer.Option(help="Room X,Z [m] of the camera, of an x wall Y,Z, of a z wall X,Y (the scene's)."),
     ] = None,
-    wall_y: Annotated[float | None, typer.Option(help="World y of the wall [m] (the scene's).")] = None,
+    wall_y: Annotated[
+        float | None,
+        typer.Option(help="The wall's room coordinate [m]: y, of an x wall x, of a z wall z (the scene's)."),
+    ] = None,
     plumb_px: Annotated[
         str | None, typer.Option(help="Lower and upper end of a vertical line on the wall: U,V,U,V.")
     ] = None,
-    camera: CameraName = "camera",
+    view: CameraName = None,
     bits: Bits = None,
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
@@ -188,11 +198,12 @@ def wall(
 ) -> None:
     """Find the back wall and place camera and projector in the room: live, or from --images, --level-image."""
     folder = CalibrationFolder(experiment)
+    camera = named_view(folder, view)
     if discard:
         folder.discard(StepName.wall, camera)
         return
     target = chosen_board(folder, board, grid, square, marker, dictionary)
-    placement = make_placement(folder, anchor, camera_at, wall_y, plumb_px)
+    placement = make_placement(folder, camera, anchor, camera_at, wall_y, plumb_px)
     known = told(ambient_temperature_k, minutes_on)
     if images is None and level_image is None:
         plan = LivePlan(StepName.wall, camera, target, frames, settle_s=settle_s, placement=placement)
@@ -214,7 +225,7 @@ def response(
         Path | None, typer.Option(help="Folder with dark, grey_<level>, exposure_<seconds>; else live.")
     ] = None,
     bits: Annotated[int | None, typer.Option(help="Bits of the camera, for --images.")] = None,
-    camera: CameraName = "camera",
+    view: CameraName = None,
     ambient_temperature_k: Ambient = None,
     minutes_on: MinutesOn = None,
     response_frames: Annotated[int, typer.Option(min=2, max=1000, help="Live: frames a burst.")] = 16,
@@ -227,6 +238,7 @@ def response(
 ) -> None:
     """Measure dark level, gain, read noise, linearity, the projector's curve and the flat field."""
     folder = CalibrationFolder(experiment)
+    camera = named_view(folder, view)
     if discard:
         folder.discard(StepName.response, camera)
         return
@@ -242,7 +254,7 @@ def response(
         full_scale(bits)
         bundle = calibrate_response(folder, camera, images, bits)
         folder.note(known)
-    _echo_response(bundle, camera, as_json)
+    _echo_response(bundle.of(camera, folder.is_first(camera)), camera, as_json)
 
 
 def _echo_response(bundle: Bundle, camera: str, as_json: bool) -> None:
@@ -301,9 +313,10 @@ def drift(
     typer.echo("".join(f"- {advice}\n" for advice in found.advice), nl=False)
 
 
-def page(experiment: Folder, camera: CameraName = "camera") -> None:
+def page(experiment: Folder, view: CameraName = None) -> None:
     """Write the calibration's figures and advice as one HTML file."""
-    typer.echo(write_page(CalibrationFolder(experiment), camera))
+    folder = CalibrationFolder(experiment)
+    typer.echo(write_page(folder, named_view(folder, view)))
 
 
 def live(

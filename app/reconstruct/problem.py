@@ -6,10 +6,10 @@ from app.errors import BadInputError
 from app.experiment.boundary import read_planes, read_sensors
 from app.experiment.calibration import read_bundle
 from app.experiment.folder import Experiment
-from calibration.bundle import Bundle
+from calibration.bundle import Bundle, CalibratedOptics
 from calibration.errors import CalibrationError
 from core.problem import ImagePair, PlaneData, Problem, SensorData, ShiftMeasurement
-from core.scene import Scene
+from core.scene import Light, ProjectedPattern, Scene, View
 from core.solve.check import check_problem
 from core.solve.recipes import regime_for
 
@@ -56,13 +56,30 @@ def _calibrated(experiment: Experiment) -> tuple[Scene, str]:
 
 
 def _with_bundle(scene: Scene, bundle: Bundle) -> tuple[Scene, str]:
-    views = []
-    for view in scene.views:
-        response = bundle.response(view.name)
-        noise = response.noise if response else view.noise
-        views.append(replace(view, camera=bundle.camera(view.name).optics, noise=noise))
+    views = tuple(_calibrated_view(scene, number, bundle) for number in range(len(scene.views)))
     light = scene.light
-    if bundle.projector is not None and light.kind == "projector":
-        light = replace(light, projector=bundle.projector.optics)
+    if scene.views[0].light is None:
+        light = _lit(light, bundle.projector)
     source = bundle.camera(scene.views[0].name).quality.source
-    return replace(scene, views=tuple(views), light=light), f"Calibration of {bundle.date}, camera {source}."
+    return replace(scene, views=views, light=light), f"Calibration of {bundle.date}, camera {source}."
+
+
+def _calibrated_view(scene: Scene, number: int, bundle: Bundle) -> View:
+    """A view by what was calibrated with its own camera. A further one that shares the scene's projector then has a
+    light of its own: that projector as its camera placed it.
+    """
+    view = scene.views[number]
+    own, response = bundle.of(view.name, number == 0), bundle.response(view.name)
+    light = view.light
+    if number > 0 and own.projector is not None:
+        light = scene.light if light is None else light
+    light = None if light is None else _lit(light, own.projector)
+    noise = response.noise if response else view.noise
+    return replace(view, camera=bundle.camera(view.name).optics, noise=noise, light=light)
+
+
+def _lit(light: Light, projector: CalibratedOptics | None) -> Light:
+    """The light by its calibrated projector, where it is one."""
+    if projector is None or not isinstance(light, ProjectedPattern):
+        return light
+    return replace(light, projector=projector.optics)

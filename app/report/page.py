@@ -278,5 +278,5 @@ def _calibration(experiment: Experiment, camera: str) -> Iterable[Picture]:
     folder = CalibrationFolder(experiment.folder)
     model = measured_model(folder, camera)
     if model is not None:
-        for title, figure in figures(model, folder.bundle()):
+        for title, figure in figures(model, folder.bundle().of(camera, folder.is_first(camera))):
             yield Picture(as_data_uri(figure), title)

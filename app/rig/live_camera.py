@@ -142,7 +142,7 @@ class LiveCamera:
         self._listeners: dict[int, Callable[[LiveFrame], object]] = {}
         self._stretches: dict[int, bool] = {}
         self._wake = threading.Condition()
-        self.air = "still"
+        self.air, self.view = "still", 0
         self.newest: Frame | None = None
         self._number = 0
         self._wishes: dict[str, _Wish] = {}
@@ -152,8 +152,10 @@ class LiveCamera:
         """The present state."""
         return self._status
 
-    def open(self, experiment: str, make: Callable[[], Camera], air: str = "still") -> CameraStatus:
-        """Open (or open again) the camera that `make` returns; `air` is what a simulated room does.
+    def open(
+        self, experiment: str, make: Callable[[], Camera], air: str = "still", view: int = 0
+    ) -> CameraStatus:
+        """Open (or open again) the camera that `make` returns; `air` is what a simulated room does, `view` its view.
 
         Raises DeviceError when it fails, DeviceBusyError while it is being opened or taking a capture.
         """
@@ -164,7 +166,7 @@ class LiveCamera:
             self._status = CameraStatus(state, experiment)
         self._tell_state()
         self._let_go(before)
-        self.air, self.newest = air, None
+        self.air, self.view, self.newest = air, view, None
         try:
             camera = make()
             told = self._wish_again(camera, experiment)

@@ -18,6 +18,7 @@ from app.rig.stage import RealStage, Stage, StageTask
 from calibration.board import Board
 from core.geometry import Optics
 from core.scene import ProjectedPattern, Scene
+from core.view_frame import facing
 from drivers.burst import CaptureRole
 from drivers.clock import Clock, SystemClock
 from drivers.display import PatternDisplay, Picture
@@ -107,40 +108,45 @@ def _twin(url: str) -> Projector:
 def open_stage(
     experiment: Experiment, board: Board | None, display: PatternDisplay | None = None, view: int = 0
 ) -> Stage:
-    """Open the experiment's rig for calibration; a real projector's screen is given as `display`."""
-    settings, scene = named_camera(experiment), experiment.settings.scene
+    """Open the rig of a view for calibration; a real projector's screen is given as `display`."""
+    settings, scene = named_camera(experiment, view), experiment.settings.scene
     if isinstance(settings, SimulatedCameraSettings):
         return PracticeStage(scene, settings, board, view)
-    return RealStage(open_real(settings), display, panel_of(scene))
+    return RealStage(open_real(settings), display, panel_of(scene, view))
 
 
-def panel_of(scene: Scene) -> tuple[int, int] | None:
-    """Native width and height of the scene's projector; None for a fixed texture."""
-    light = scene.light
+def panel_of(scene: Scene, view: int = 0) -> tuple[int, int] | None:
+    """Native width and height of the projector that lights a view's wall; None for a fixed texture."""
+    light = scene.views[view].light or scene.light
     return (
         (light.projector.width_px, light.projector.height_px) if isinstance(light, ProjectedPattern) else None
     )
 
 
 class PracticeStage:
-    """A simulated rig whose boards, wall and light arrange themselves: see `app.rig.stage.Stage`."""
+    """A simulated rig whose boards, wall and light arrange themselves: see `app.rig.stage.Stage`.
+
+    It stands in the view's own frame, where its wall is y_max: pictures are the same there.
+    """
 
     arranges_itself = True
 
     def __init__(
         self, scene: Scene, settings: SimulatedCameraSettings, board: Board | None, view: int
     ) -> None:
-        self._room = PracticeRoom(scene, view, board)
-        self.panel_px = panel_of(scene)
-        light = scene.light
+        name, noise = scene.views[view].name, _sensor(scene, settings, view)
+        self.panel_px = panel_of(scene, view)
+        framed, number = facing(scene, view)
+        self._room = PracticeRoom(framed, number, board)
+        light = framed.light
         panel = light.projector if isinstance(light, ProjectedPattern) else None
         self.display = None if panel is None else _PracticeDisplay(panel, self._room.show)
         self.camera = SimulatedCamera(
             self._room,
-            seed=2 * settings.seed,
-            noise=_sensor(scene, settings, view),
+            seed=2 * settings.seed + VIEWS_APART * view,
+            noise=noise,
             exposure_s=settings.exposure_s,
-            name=f"simulated {scene.views[view].name}",
+            name=f"simulated {name}",
         )
 
     def arrange(self, task: StageTask) -> None:

@@ -3,7 +3,6 @@
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
@@ -21,12 +20,13 @@ from app.experiment.folder import (
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.files.durable import durable_folder, write_durably, write_text
 from app.rig.open import air_of, named_camera, open_camera
+from app.simulate.stated_bundle import bundle_as_stated
 from app.volume.file import RoomVolume, read_volume
 from app.volume.misread import misread
 from app.volume.scene import Information, RigOptions, room_box, room_scene, write_plane
 from app.volume.snapshots import read_snapshots
-from calibration.bundle import given_bundle, to_json
-from core.scene import PlaneField, ProjectedPattern, Scene
+from calibration.bundle import to_json
+from core.scene import PlaneField, Scene
 from drivers.burst import CapturePlan, Progress
 
 SNAPSHOTS_FILE = "snapshots.npz"
@@ -94,7 +94,7 @@ def _fill(
         write_durably(folder / name, lambda temporary, path=path: shutil.copyfile(path, temporary))
     if any(isinstance(known, PlaneField) for known in scene.boundary):
         write_plane(folder, volume)
-    write_text(experiment.bundle_path, to_json(_bundle(scene)))
+    write_text(experiment.bundle_path, to_json(bundle_as_stated(scene)))
 
 
 def _capture(experiment: Experiment, bracketed: bool, on_stage: OnStage) -> None:
@@ -114,14 +114,3 @@ def _capture(experiment: Experiment, bracketed: bool, on_stage: OnStage) -> None
             taken = take(opened, experiment, plan, watch=BurstWatch(progress), series=series, moment=place)
         if taken.shortfall:
             raise AirlensError(taken.shortfall)
-
-
-def _bundle(scene: Scene):
-    light = scene.light
-    return given_bundle(
-        date=datetime.now(UTC).isoformat(timespec="seconds"),
-        cameras={view.name: view.camera for view in scene.views},
-        projector=light.projector if isinstance(light, ProjectedPattern) else None,
-        noise={view.name: view.noise for view in scene.views},
-        back_wall_y_m=scene.room.upper_m[1],
-    )

@@ -2,7 +2,6 @@
 
 import shutil
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
@@ -17,13 +16,13 @@ from app.experiment.folder import (
 )
 from app.experiment.rig_settings import BoardSettings, ProjectorSettings, RigSettings
 from app.files.durable import write_durably
+from app.simulate.stated_bundle import bundle_as_stated
 from app.simulate.worlds import WORLDS, WorldName
 from app.volume.file import read_volume
 from app.volume.misread import misread
 from app.volume.sample import SAMPLE_ROOM
 from app.volume.scene import RIG_PLACES, Information, RigOptions, room_scene, write_plane
-from calibration.bundle import given_bundle
-from core.scene import PlaneField, ProjectedPattern
+from core.scene import PlaneField
 
 # Fast enough to practise with; a real lamp takes longer, and its lamp guard is the real one.
 TWIN = ProjectorSettings(url="simulated:?warm_up_s=8&cool_down_s=6")
@@ -78,13 +77,5 @@ def rehearse(root: Path, wanted: Rehearsal) -> Experiment:
 
 def calibrate_simulated(experiment: Experiment) -> None:
     """Write the bundle of a simulated rig, whose models are those of its scene."""
-    scene = experiment.settings.scene
-    light = scene.light
-    bundle = given_bundle(
-        date=datetime.now(UTC).isoformat(timespec="seconds"),
-        cameras={view.name: view.camera for view in scene.views},
-        projector=light.projector if isinstance(light, ProjectedPattern) else None,
-        noise={view.name: view.noise for view in scene.views},
-        back_wall_y_m=scene.room.upper_m[1],
-    )
+    bundle = bundle_as_stated(experiment.settings.scene)
     CalibrationFolder(experiment.folder).change_bundle(lambda _old: bundle)

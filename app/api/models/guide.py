@@ -48,6 +48,7 @@ class GuideResource(WireModel):
     state: Literal["idle", "running", "failed"]
     busy: bool
     step: StepText
+    view: str
     reason: str
     wanted: WantedResource | None
     done: int
@@ -68,10 +69,12 @@ class GuideResource(WireModel):
 class GuideRequest(WireModel):
     """Which step, and how; without a board, the experiment's own is used (rehearsals have one).
 
-    `anchor` is a wall point seen at u, v whose world x, z [m] were measured.
+    `view` is the camera's, by its name; of one view it may be left out. `anchor` is a wall point seen at u, v whose
+    room coordinates [m] across the view were measured: x, z of a y wall, y, z of an x wall, x, y of a z wall.
     """
 
     step: StepText
+    view: str | None = Field(default=None, max_length=200)
     board: BoardGeometry | None = None
     frames: int = Field(default=1, ge=1, le=1000)
     response_frames: int = Field(default=16, ge=2, le=1000)

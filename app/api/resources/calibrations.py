@@ -13,7 +13,8 @@ from app.calibrate.parts import Part, bundle_of, is_calibrated, parts_of
 from app.experiment.folder import Experiment
 from app.simulate.rehearsal import calibrate_simulated
 from calibration.bundle import Bundle, CalibratedOptics
-from core.geometry import Optics, Vector3
+from core.geometry import Optics, face_of
+from core.scene import Scene, View
 
 router = APIRouter(tags=["calibrations"])
 
@@ -47,30 +48,38 @@ def calibrate(given: Given, experiment: Identifier, new: NewCalibration) -> Cali
 
 def _resource(experiment: Experiment) -> CalibrationResource:
     bundle, parts = bundle_of(experiment), parts_of(experiment)
-    room = experiment.settings.scene.room
+    room, scene = experiment.settings.scene.room, experiment.settings.scene
+    views = [(view, bundle.of(view.name, number == 0)) for number, view in enumerate(scene.views)]
+    several = len(views) > 1
+    items = [item for view, own in views for item in _items(own, view.name if several else "")]
+    lacking = [_missing(part, name if several else "") for part in parts for name in part.lacking]
     return CalibrationResource(
         state="calibrated" if is_calibrated(parts) else "incomplete",
         date=bundle.date if experiment.bundle_path.is_file() else None,
-        items=[*_items(bundle), *(_missing(part) for part in parts if part.state == "missing")],
+        items=[*items, *lacking],
         room_m=[list(room.lower_m), list(room.upper_m)],
-        rig=_rig(bundle, room.upper_m),
+        rig=[standing for view, own in views for standing in _rig(own, view, scene, several)],
     )
 
 
-def _rig(bundle: Bundle, beyond_m: Vector3) -> list[StandingResource]:
-    """Every optics with the corners of its picture on the wall: as calibrated, or the room's own back wall."""
-    wall = bundle.wall
-    point = np.array(beyond_m if wall is None else wall.point_m)
-    normal = np.array((0.0, 1.0, 0.0) if wall is None else wall.normal)
-    projector = () if bundle.projector is None else (bundle.projector,)
+def _rig(own: Bundle, view: View, scene: Scene, several: bool) -> list[StandingResource]:
+    """A view's optics with the corners of their pictures on its wall: as calibrated, or the room's own."""
+    wall, face = own.wall, face_of(view.wall)
+    normal = np.zeros(3)
+    normal[face.axis] = 1.0 if face.upper else -1.0
+    point = np.array(
+        (scene.room.upper_m if face.upper else scene.room.lower_m) if wall is None else wall.point_m
+    )
+    normal = normal if wall is None else np.array(wall.normal)
+    projector = () if own.projector is None else (own.projector,)
     return [
         StandingResource(
-            name=one.name,
-            role="projector" if one is bundle.projector else "camera",
+            name=f"{one.name} of {view.name}" if several and one is own.projector else one.name,
+            role="projector" if one is own.projector else "camera",
             position_m=list(one.optics.position_m),
             corners_m=corners_on(one.optics, point, normal),
         )
-        for one in (*bundle.cameras, *projector)
+        for one in (*own.cameras, *projector)
     ]
 
 
@@ -92,34 +101,38 @@ def corners_on(
     return found
 
 
-def _items(bundle: Bundle) -> list[CalibrationItem]:
-    projector = () if bundle.projector is None else (bundle.projector,)
-    items = [_optics(one) for one in (*bundle.cameras, *projector)]
-    if bundle.wall is not None:
-        x, y, z = bundle.wall.point_m
+def _items(own: Bundle, view: str) -> list[CalibrationItem]:
+    """What is known of one view; `view` is named where there are several."""
+    of = f" of {view}" if view else ""
+    items = [_optics(one, one.name) for one in own.cameras]
+    if own.projector is not None:
+        items.append(_optics(own.projector, f"{own.projector.name}{of}"))
+    if own.wall is not None:
+        x, y, z = own.wall.point_m
         plane = f"plane through ({x:.3f}, {y:.3f}, {z:.3f}) m"
         items.append(
             CalibrationItem(
-                name="back wall",
-                state=bundle.wall.quality.source,
+                name=f"wall{of}" if view else "back wall",
+                state=own.wall.quality.source,
                 value=plane,
-                advice=_advice(bundle.wall.quality.advice),
+                advice=_advice(own.wall.quality.advice),
             )
         )
-    for response in bundle.camera_responses:
+    for response in own.camera_responses:
         value = f"dark {response.dark_counts:.1f} counts, {response.bits} bit"
         name, source = f"response of {response.name}", response.quality.source
         items.append(CalibrationItem(name=name, state=source, value=value, advice=""))
     return items
 
 
-def _missing(part: Part) -> CalibrationItem:
+def _missing(part: Part, view: str) -> CalibrationItem:
     name, standing = _WITHOUT[part.step]
     advice = f"{standing} Take the step '{part.step}'{'' if part.needed else ' where noise matters'}."
-    return CalibrationItem(name=name, state="missing", value="not calibrated", advice=advice)
+    called = f"{part.step} of {view}" if view else name
+    return CalibrationItem(name=called, state="missing", value="not calibrated", advice=advice)
 
 
-def _optics(one: CalibratedOptics) -> CalibrationItem:
+def _optics(one: CalibratedOptics, name: str) -> CalibrationItem:
     quality = one.quality
     focal_px = one.optics.focal_px[0]
     known = (
@@ -129,7 +142,7 @@ def _optics(one: CalibratedOptics) -> CalibrationItem:
         f"{100 * quality.coverage:.0f} % of the image covered"
     )
     return CalibrationItem(
-        name=one.name,
+        name=name,
         state=quality.source,
         value=f"focal length {focal_px:.1f} px; {known}",
         advice=_advice(quality.advice),

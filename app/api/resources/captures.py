@@ -28,10 +28,10 @@ from app.api.wire.volumes import Encoding, pack
 from app.capture.burst import Order
 from app.capture.imported import TakenBy, import_files
 from app.capture.service import DeskState
-from app.capture.views import view_names
 from app.errors import BadInputError
 from app.experiment.capture_files import BurstImage
 from app.experiment.captures import load_capture
+from app.experiment.views import view_names
 from app.files.durable import write_text
 from app.rig.conditions import Conditions, conditions_in
 from drivers.burst import CapturePlan

@@ -10,24 +10,30 @@ from app.api.wire.board import board_settings
 from app.api.wire.identifier import Identifier
 from app.calibrate.folder import CalibrationFolder, StepName
 from app.calibrate.guide import LivePlan
+from app.calibrate.placement import placed
 from app.calibrate.service import GuideState
 from app.calibrate.state import state_of
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
+from app.experiment.views import view_names, view_number
 from app.rig.conditions import Conditions
 from app.rig.stage import StageTask
 from calibration.board import Board
-from calibration.record import Placement
 
 router = APIRouter(tags=["calibrations"])
 StepQuery = Annotated[StepText, Query(description="Which step of the calibration.")]
+CameraQuery = Annotated[
+    str | None, Query(alias="camera", max_length=200, description="Which view's camera, by the view's name.")
+]
 
 
 @router.get("/experiments/{experiment}/calibration/guide")
-def read_guide(given: Given, experiment: Identifier, step: StepQuery = "camera") -> GuideResource:
+def read_guide(
+    given: Given, experiment: Identifier, step: StepQuery = "camera", camera: CameraQuery = None
+) -> GuideResource:
     """Return what is wanted next and how good the step is so far."""
     found = given.folders.open(experiment)
-    return _resource(given, found, _plan(found, GuideRequest(step=step)))
+    return _resource(given, found, _plan(found, GuideRequest(step=step, view=camera)))
 
 
 @router.post("/experiments/{experiment}/calibration/guide", status_code=202)
@@ -49,44 +55,51 @@ def skip_guided(given: Given, experiment: Identifier, request: GuideRequest) -> 
 
 
 @router.post("/experiments/{experiment}/calibration/guide/stop")
-def stop_guided(given: Given, experiment: Identifier, step: StepQuery = "camera") -> GuideResource:
+def stop_guided(
+    given: Given, experiment: Identifier, step: StepQuery = "camera", camera: CameraQuery = None
+) -> GuideResource:
     """Stop within a frame; the pictures taken so far are kept."""
     found = given.folders.open(experiment)
     given.guide.stop()
-    return _resource(given, found, _plan(found, GuideRequest(step=step)))
+    return _resource(given, found, _plan(found, GuideRequest(step=step, view=camera)))
 
 
 @router.delete("/experiments/{experiment}/calibration/guide")
-def discard_guided(given: Given, experiment: Identifier, step: StepQuery = "camera") -> GuideResource:
+def discard_guided(
+    given: Given, experiment: Identifier, step: StepQuery = "camera", camera: CameraQuery = None
+) -> GuideResource:
     """Forget what a step has taken and not completed; the calibration in use stays as it is."""
     found = given.folders.open(experiment)
-    plan = _plan(found, GuideRequest(step=step))
+    plan = _plan(found, GuideRequest(step=step, view=camera))
     given.guide.discard(found, plan)
     return _resource(given, found, plan)
 
 
 @router.delete("/experiments/{experiment}/calibration/views/{view}")
 def retake_view(
-    given: Given, experiment: Identifier, view: Identifier, step: StepQuery = "camera"
+    given: Given,
+    experiment: Identifier,
+    view: Identifier,
+    step: StepQuery = "camera",
+    camera: CameraQuery = None,
 ) -> GuideResource:
     """Forget a view, so that it is asked for again."""
     found = given.folders.open(experiment)
-    plan = _plan(found, GuideRequest(step=step))
+    plan = _plan(found, GuideRequest(step=step, view=camera))
     given.guide.retake(found, plan, view)
     return _resource(given, found, plan)
 
 
 def _plan(experiment: Experiment, request: GuideRequest) -> LivePlan:
-    camera = experiment.settings.scene.views[0]
-    x_m, _, z_m = camera.camera.position_m
-    wall_y_m = experiment.settings.scene.room.upper_m[1]
-    place = Placement(None, x_m, z_m, wall_y_m, request.plumb_px)
+    camera = view_names(experiment)[view_number(experiment, request.view)]
+    anchor_px, across_m = None, None
     if request.anchor is not None:
-        u, v, x_m, z_m = request.anchor
-        place = Placement((u, v), x_m, z_m, wall_y_m, request.plumb_px)
+        u, v, *across_m = request.anchor
+        anchor_px = (u, v)
+    place = placed(experiment.settings.scene, camera, anchor_px, across_m, plumb_px=request.plumb_px)
     return LivePlan(
         StepName(request.step),
-        camera.name,
+        camera,
         _board(experiment, request),
         request.frames,
         request.response_frames,
@@ -105,7 +118,8 @@ def _board(experiment: Experiment, request: GuideRequest) -> Board | None:
 
 def _resource(given: Services, experiment: Experiment, plan: LivePlan) -> GuideResource:
     status = given.guide.status
-    own = status.experiment == experiment.folder.name and status.step == plan.step
+    asked = (experiment.folder.name, plan.step, plan.camera)
+    own = (status.experiment, status.step, status.camera) == asked
     running = own and status.state is GuideState.running
     reason = status.reason if own else ""
     try:
@@ -118,6 +132,7 @@ def _resource(given: Services, experiment: Experiment, plan: LivePlan) -> GuideR
         state=status.state.value if own else "idle",
         busy=status.state is GuideState.running,
         step=plan.step.value,
+        view=plan.camera,
         reason=reason,
         wanted=None if wanted is None else _wanted(wanted),
         done=status.done if own else 0,

@@ -62,13 +62,15 @@ export async function ask<R extends Request>(
 
 /** The address of a request, for a picture, a stream or a file. */
 export function address<R extends Request>(request: R, given: Given<R>): string {
-  const left = new Map(Object.entries(given as Record<string, string | number | undefined>));
+  const left = new Map(Object.entries(given as Record<string, string | number | null | undefined>));
   const path = request.replace(/^\w+ /, "").replace(/\{(\w+)\}/g, (_, name: string) => {
     const value = left.get(name);
     left.delete(name);
     return encodeURIComponent(String(value));
   });
-  const query = [...left].flatMap(([name, value]) => (value === undefined ? [] : [[name, String(value)]]));
+  const query = [...left].flatMap(([name, value]) =>
+    value === undefined || value === null ? [] : [[name, String(value)]],
+  );
   return `/api${path}${query.length ? `?${new URLSearchParams(query)}` : ""}`;
 }
 

@@ -2,11 +2,15 @@
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
 from app.api.models.guide import GuideResource, StepText
 from app.client import Client, ServiceError
+from app.experiment.folder import open_experiment, save_settings
+from core.scene import FixedTexture
+from core.view_frame import turn_to
 from tests.app.api.conftest import Live
 
 
@@ -87,3 +91,30 @@ def test_a_started_step_is_discarded(airlens: Client, experiment: str):
     assert (discarded.started, discarded.views) == (False, [])
     airlens.take_guided(experiment)
     assert len(finished(airlens, experiment).views) == 1
+
+
+def test_each_camera_is_guided_by_its_name(airlens: Client, live: Live):
+    made = airlens.create_experiment("Two cameras", camera_px=256).experiment
+    found = open_experiment(live.app.state.services.folders.folder(made))
+    (first,) = found.settings.scene.views
+    turn = turn_to("x_max").back()
+    second = replace(first, name="side", wall="x_max", camera=turn.optics(first.camera), light=FixedTexture())
+    scene = replace(found.settings.scene, views=(first, second))
+    save_settings(found.folder, found.settings.model_copy(update={"scene": scene}))
+    with pytest.raises(ServiceError, match="2 views: 'camera', 'side'"):
+        airlens.guide(made)
+    with pytest.raises(ServiceError, match="no view 'left'; its views are 'camera', 'side'"):
+        airlens.take_guided(made, view="left")
+
+    assert airlens.take_guided(made, view="side").view == "side"
+    until_s = time.monotonic() + 200
+    while (after := airlens.guide(made, view="side")).state == "running":
+        assert time.monotonic() < until_s
+        time.sleep(0.05)
+    assert [view.name for view in after.views] == ["view_00.png"]
+    assert airlens.camera().name == "simulated side"
+    other = airlens.guide(made, view="camera")
+    assert (other.view, other.state, other.views) == ("camera", "idle", [])
+    missing = [one.name for one in airlens.calibration(made).items if one.state == "missing"]
+    assert {"camera of camera", "camera of side", "wall of side", "response of side"} <= set(missing)
+    assert airlens.retake_view(made, "view_00.png", camera="side").views == []

@@ -1,0 +1,24 @@
+"""The views of an experiment, by their names."""
+
+from app.errors import BadInputError
+from app.experiment.folder import Experiment
+
+
+def view_names(experiment: Experiment) -> tuple[str, ...]:
+    """What the scene's views are called, in their order."""
+    return tuple(view.name for view in experiment.settings.scene.views)
+
+
+def view_number(experiment: Experiment, name: str | None) -> int:
+    """The number of the view called so; where there is one view it need not be named. Raises BadInputError."""
+    names = view_names(experiment)
+    if name is None and len(names) == 1:
+        return 0
+    known = ", ".join(repr(one) for one in names)
+    if name is None:
+        raise BadInputError(
+            f"{experiment.folder.name} has {len(names)} views: {known}. Say which one is meant, by its name."
+        )
+    if name not in names:
+        raise BadInputError(f"{experiment.folder.name} has no view {name!r}; its views are {known}.")
+    return names.index(name)
