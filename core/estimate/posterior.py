@@ -110,7 +110,7 @@ def sentences(analysis: Analysis, error: ModelError, doubt: float) -> list[str]:
     return [
         *analysis.layout.notes,
         *undetermined(analysis.problem),
-        *contradictions(analysis.problem, analysis.prior, analysis.posterior, np.abs(error.moved[0])),
+        *contradictions(analysis.problem, analysis.prior, analysis.posterior, np.abs(error.moved[0]), doubt),
         *misfit(analysis.data, explained(analysis.data, analysis.best.fields)),
         *doubtful(doubt),
         *other_way(likeness(analysis.data, analysis.stated_room)),

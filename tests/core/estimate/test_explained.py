@@ -79,8 +79,12 @@ def test_pictures_that_went_the_other_way_are_told_and_those_of_noise_are_not():
     assert not other_way(likeness(noise, room_of(-3.0)))
 
 
-@pytest.mark.parametrize(("closure", "told"), [(0.0, True), (2.0, False)])
-def test_an_entry_is_called_wrong_only_beyond_what_entry_and_closure_allow(closure: float, told: bool):
+@pytest.mark.parametrize(
+    ("closure", "doubt", "told"), [(0.0, 0.2, True), (2.0, 0.2, False), (0.0, 0.6, False)]
+)
+def test_an_entry_is_called_wrong_only_beyond_what_entry_and_model_allow(
+    closure: float, doubt: float, told: bool
+):
     given = problem(stated=True)
     prior = prior_of(given)
     own = prior.names().index("inlet_log_flow[0]")
@@ -88,7 +92,7 @@ def test_an_entry_is_called_wrong_only_beyond_what_entry_and_closure_allow(closu
     vector[own] = 4.0
     found = Posterior(vector, 0.01 * np.eye(len(vector)), np.zeros(0))
 
-    said = contradictions(given, prior, found, np.full(len(vector), closure))
+    said = contradictions(given, prior, found, np.full(len(vector), closure), doubt)
 
     assert len(said) == told
     assert all("4.0 times what the entry and the model may be wrong by" in text for text in said)
