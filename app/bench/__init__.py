@@ -9,6 +9,10 @@ BENCHES = {
         "Measure this machine once, a few minutes, so that plans predict time and memory.",
     ),
     "draft": ("app.bench.draft", "T beside the trivial answer, with a printed and with a projected pattern."),
+    "openfoam": (
+        "app.bench.openfoam",
+        "A room by airlens' own march and by OpenFOAM (where it is installed), both from rest on the same cells.",
+    ),
     "placement": (
         "app.bench.placement",
         "Share of the signal that a projector-lit wall keeps, by stand-off and baseline.",

@@ -16,10 +16,11 @@ from core.estimate.explained import explained
 from core.estimate.forward_runs import Derivatives, ForwardRun
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior
-from core.geometry import WALLS, Face, face_of
+from core.geometry import WALLS, Box, Face, face_of
 from core.room.boundary_conditions import RoomLayout
 from core.room.room_grid import AXES
 from core.room.vertices import RoomFields, cell_matrix
+from core.scene import Patch
 
 # Least departure from the profile: air of one temperature has none, but its correction needs a prior.
 _LEAST_DEPARTURE_K = 1e-3
@@ -80,16 +81,31 @@ def last_correction(
     return temperature_correction(data, fields.excess_k, residual, own_k, level_k, wrong, walls, outlet_std_k)
 
 
-def outlets_apart_k(data: Observations, pairs: Iterable[tuple[RoomFields, RoomFields]]) -> float:
+def outlets_apart_k(
+    data: Observations, room: RoomFields, pairs: Iterable[tuple[RoomFields, RoomFields]]
+) -> float:
     """How far what leaves may be from the air at the outlets' height, one standard deviation; 0 without outlets.
 
-    An outlet may draw from a jet or a plume beside it. Models differ in that about as much as each is wrong: the
-    variances are what each pair of rooms differs by, as a mean over the outlets.
+    An outlet may draw from a jet or a plume beside it: from any place along its wall at its heights, as `room` has
+    them, and by as much as models differ in what leaves, which is what each pair of rooms differs by.
     """
     if not data.outlets:
         return 0.0
+    along = np.mean([_along_wall_k2(data.scene.room, outlet.patch, room) for _, outlet, _ in data.outlets])
     apart = [_from_height_k(data, one) - _from_height_k(data, other) for one, other in pairs]
-    return float(np.sqrt(sum(np.mean(np.square(difference)) for difference in apart)))
+    return float(np.sqrt(along + sum(np.mean(np.square(difference)) for difference in apart)))
+
+
+def _along_wall_k2(box: Box, patch: Patch, room: RoomFields) -> float:
+    """Variance of T on the vertices beside the patch's wall, at the heights of the patch."""
+    face = face_of(patch.wall)
+    beside = np.take(room.excess_k, 1 if face.end == 0 else -2, axis=face.axis)[1:-1]
+    if face.axis == 2:
+        return float(beside[:, 1:-1].var())
+    heights_m = np.linspace(box.lower_m[2], box.upper_m[2], beside.shape[1])
+    nearest = np.abs(heights_m - 0.5 * (patch.lower_m[1] + patch.upper_m[1]))
+    within = nearest <= max(0.5 * (patch.upper_m[1] - patch.lower_m[1]), nearest.min())
+    return float(beside[:, within].var())
 
 
 def _from_height_k(data: Observations, room: RoomFields) -> Float[np.ndarray, " outlets"]:

@@ -143,7 +143,8 @@ def fitted_room(
         found = fine_fit(fine, prior, data, vector, first, linearised, settings, marches)
     before = best = found.room
     stated = background.first.fields
-    outlet_std_k = outlets_apart_k(data, ((other, linearised.start), (stated, before.fields)))
+    pairs = (other, linearised.start), (stated, before.fields)
+    outlet_std_k = outlets_apart_k(data, before.fields, pairs)
     if settings.use_images:
         best = held_fit(fine, prior, data, before, derivatives, settings, marches, outlet_std_k)
     return Analysis(
@@ -175,7 +176,8 @@ def _by_ensemble(
     base = march_under(coarse, parameters, found.flow, settings.restart_s, vertices, marches, doing=doing)
     other = run_under_other_closure(coarse, parameters, base, settings, vertices, marches)
     stated = background.first.fields
-    outlet_std_k = outlets_apart_k(data, ((other, base.fields), (stated, found.room.fields)))
+    pairs = (other, base.fields), (stated, found.room.fields)
+    outlet_std_k = outlets_apart_k(data, found.room.fields, pairs)
     return Analysis(
         background.problem,
         data,

@@ -71,8 +71,22 @@ def test_what_leaves_is_as_uncertain_as_rooms_differ_in_drawing_it_from_elsewher
         return RoomFields(air, 0.0 * air, np.zeros((*VERTICES, 3)), np.array([level_k + apart_k]))
 
     near, beside, far = drawing(5.0, 0.0), drawing(6.0, 0.3), drawing(4.0, -0.4)
-    assert outlets_apart_k(data, [(near, near), (near, drawing(7.0, 0.0))]) == pytest.approx(0.0, abs=1e-9)
-    assert outlets_apart_k(data, [(near, beside), (far, near)]) == pytest.approx(0.5)
+    pairs = [(near, near), (near, drawing(7.0, 0.0))]
+    assert outlets_apart_k(data, near, pairs) == pytest.approx(0.0, abs=1e-9)
+    assert outlets_apart_k(data, near, [(near, beside), (far, near)]) == pytest.approx(0.5)
+
+
+def test_an_outlet_may_draw_from_any_place_along_its_wall_at_its_heights():
+    data = observations(problem(stated=False), VERTICES)
+    excess_k = np.full(VERTICES, 5.0)
+    # Heights 0 to 2 m on 7 vertices; the outlet lies from 0.4 to 0.6 m. Cold air beside it, and on another wall.
+    excess_k[1, 1:4, 1:3] = 3.0
+    excess_k[1, :, 5] = -9.0
+    excess_k[-2, 2, 1] = -9.0
+    room = RoomFields(excess_k, 0.0 * excess_k, np.zeros((*VERTICES, 3)), np.array([5.0]))
+
+    # Three of the six places between the side walls are 2 K colder.
+    assert outlets_apart_k(data, room, ()) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(("held_k_m3_s", "said"), [(0.3, "W more"), (-0.3, "W less"), (0.02, None)])

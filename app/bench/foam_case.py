@@ -1,0 +1,213 @@
+"""A room without objects as a case for OpenFOAM's steady solver of buoyant air, from rest; its fields read back."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from app.errors import BadInputError
+from core.air import GRAVITY_M_S2
+from core.geometry import WALLS, WallName, face_of
+from core.known import stated_walls
+from core.room.k_epsilon import TURBULENT_PRANDTL
+from core.room.openings import supply_turbulence
+from core.scene import Heater, Inlet, Outlet, Scene
+
+SOLVER = "buoyantBoussinesqSimpleFoam"
+# Corners of the one block, and which of them each wall has, in the order of `WALLS`.
+_FACES = ("(0 4 7 3)", "(1 2 6 5)", "(0 1 5 4)", "(3 7 6 2)", "(0 3 2 1)", "(4 5 6 7)")
+_SCHEMES = """ddtSchemes { default steadyState; }
+gradSchemes { default Gauss linear; grad(U) cellLimited Gauss linear 1; grad(T) cellLimited Gauss linear 1; }
+divSchemes
+{
+    default none;
+    div(phi,U) bounded Gauss linearUpwind grad(U);
+    div(phi,T) bounded Gauss linearUpwind grad(T);
+    div(phi,k) bounded Gauss upwind;
+    div(phi,epsilon) bounded Gauss upwind;
+    div((nuEff*dev2(T(grad(U))))) Gauss linear;
+}
+laplacianSchemes { default Gauss linear orthogonal; }
+interpolationSchemes { default linear; }
+snGradSchemes { default orthogonal; }
+"""
+_SOLUTION = """solvers
+{
+    p_rgh { solver GAMG; smoother GaussSeidel; tolerance 1e-9; relTol 0.02; }
+    "(U|T|k|epsilon)" { solver PBiCGStab; preconditioner DILU; tolerance 1e-10; relTol 0.05; }
+}
+SIMPLE { nNonOrthogonalCorrectors 0; }
+relaxationFactors { fields { p_rgh 0.7; } equations { U 0.3; T 0.7; "(k|epsilon)" 0.4; } }
+"""
+
+
+def write_case(case: Path, scene: Scene, cells: tuple[int, int, int], every: int, most: int) -> None:
+    """The room as a case that starts from still air, written out after so many iterations, and that many in all.
+
+    Raises BadInputError for objects, heaters and walls of unknown heat.
+    """
+    if scene.objects or any(isinstance(part, Heater) for part in scene.boundary):
+        raise BadInputError(
+            "This room has objects or heaters, which the case for OpenFOAM does not hold. Take a room without."
+        )
+    openings = {
+        f"opening{n}": part
+        for n, part in enumerate(part for part in scene.boundary if isinstance(part, Inlet | Outlet))
+    }
+    patches = "".join(
+        f"    {{ name {name}; patchInfo {{ type patch; }} constructFrom set; set {name}; }}\n"
+        for name in openings
+    )
+    texts = {
+        "constant/transportProperties": _transport(scene),
+        "constant/turbulenceProperties": "simulationType RAS;\nRAS { RASModel kEpsilon; turbulence on; }\n",
+        "system/controlDict": (
+            f"application {SOLVER};\nstartFrom startTime;\nstartTime 0;\nstopAt endTime;\nendTime {most};\n"
+            f"deltaT 1;\nwriteControl timeStep;\nwriteInterval {every};\nwritePrecision 7;\n"
+        ),
+        "system/fvSchemes": _SCHEMES,
+        "system/fvSolution": _SOLUTION,
+        "system/blockMeshDict": _block(scene, cells),
+        "system/topoSetDict": _sets(scene, openings),
+        "system/createPatchDict": f"pointSync false;\npatches\n(\n{patches});\n",
+    }
+    for folder in ("0", "constant", "system"):
+        (case / folder).mkdir()
+    for path, text in texts.items():
+        (case / path).write_text(_header("dictionary", Path(path).name) + text)
+    gravity = f"dimensions [0 1 -2 0 0 0 0];\nvalue (0 0 -{GRAVITY_M_S2:.9g});\n"
+    (case / "constant/g").write_text(_header("uniformDimensionedVectorField", "g") + gravity)
+    for name, (dimensions, inside, boundary) in _fields(scene, openings).items():
+        (case / "0" / name).write_text(
+            _header("volVectorField" if name == "U" else "volScalarField", name)
+            + f"dimensions {dimensions};\ninternalField uniform {inside};\nboundaryField\n{{\n"
+            + "".join(f"    {patch} {{ {told} }}\n" for patch, told in boundary.items())
+            + "}\n"
+        )
+
+
+def read_field(path: Path, cells: tuple[int, int, int]) -> Float[np.ndarray, "nx ny nz parts"]:
+    """A field that the case wrote: blockMesh numbers its cells with x fastest."""
+    text = path.read_text()
+    inside = text[text.index("internalField") : text.index("boundaryField")]
+    numbers = inside[inside.index("\n(") :].translate(str.maketrans("();", "   ")).split()
+    return np.array(numbers, float).reshape(*cells[::-1], -1).transpose(2, 1, 0, 3)
+
+
+def _fields(scene: Scene, openings: dict[str, Inlet | Outlet]) -> dict[str, tuple[str, str, dict[str, str]]]:
+    """Dimensions, value inside and boundary of every field at rest."""
+    ambient_k = scene.air.ambient_temperature_k
+    plain, pushed = "type calculated; value uniform 0;", "type fixedFluxPressure; rho rhok; value uniform 0;"
+
+    def fixed(value: object) -> str:
+        return f"type fixedValue; value uniform {value};"
+
+    def leaving(value: object) -> str:
+        return f"type inletOutlet; inletValue uniform {value}; value uniform {value};"
+
+    def of(on_wall: str, on_inlet: Callable[[Inlet], str], on_outlet: str) -> dict[str, str]:
+        found = {f'"({"|".join(WALLS)})"': on_wall}
+        return found | {
+            name: on_inlet(part) if isinstance(part, Inlet) else on_outlet for name, part in openings.items()
+        }
+
+    def wall_function(kind: str, value: object = 0, more: str = "") -> str:
+        return f"type {kind};{more} value uniform {value};"
+
+    warm = of("", lambda part: fixed(f"{part.temperature_k:.7g}"), leaving(f"{ambient_k:.7g}"))
+    warm = {name: _wall_heat(scene, name) for name in WALLS} | {name: warm[name] for name in openings}
+    return {
+        "U": (
+            "[0 1 -1 0 0 0 0]",
+            "(0 0 0)",
+            of(
+                "type noSlip;",
+                lambda part: fixed("({:.7g} {:.7g} {:.7g})".format(*part.velocity_m_s)),
+                "type pressureInletOutletVelocity; value uniform (0 0 0);",
+            ),
+        ),
+        "T": ("[0 0 0 1 0 0 0]", f"{ambient_k:.7g}", warm),
+        "p": ("[0 2 -2 0 0 0 0]", "0", {'".*"': plain}),
+        "p_rgh": ("[0 2 -2 0 0 0 0]", "0", of(pushed, lambda part: pushed, fixed(0))),
+        "k": (
+            "[0 2 -2 0 0 0 0]",
+            "0.001",
+            of(
+                wall_function("kqRWallFunction", 0.001),
+                lambda part: fixed(f"{supply_turbulence(part)[0]:.7g}"),
+                leaving(0.001),
+            ),
+        ),
+        "epsilon": (
+            "[0 2 -3 0 0 0 0]",
+            "0.0005",
+            of(
+                wall_function("epsilonWallFunction", 0.0005),
+                lambda part: fixed(f"{supply_turbulence(part)[1]:.7g}"),
+                leaving(0.0005),
+            ),
+        ),
+        "nut": ("[0 2 -1 0 0 0 0]", "0", of(wall_function("nutkWallFunction"), lambda part: plain, plain)),
+        "alphat": (
+            "[0 2 -1 0 0 0 0]",
+            "0",
+            of(
+                wall_function("alphatJayatillekeWallFunction", more=f" Prt {TURBULENT_PRANDTL};"),
+                lambda part: plain,
+                plain,
+            ),
+        ),
+    }
+
+
+def _wall_heat(scene: Scene, name: WallName) -> str:
+    wall = stated_walls(scene)[name]
+    if wall is None or wall.thermal == "unknown":
+        raise BadInputError(f"The heat through {name} is not known: take a room whose walls are all stated.")
+    if wall.thermal == "adiabatic" or wall.temperature_k is None:
+        return "type zeroGradient;"
+    return f"type fixedValue; value uniform {wall.temperature_k:.7g};"
+
+
+def _transport(scene: Scene) -> str:
+    air = scene.air
+    return (
+        f"transportModel Newtonian;\nnu [0 2 -1 0 0 0 0] {air.kinematic_viscosity_m2_s:.9g};\n"
+        f"beta [0 0 0 -1 0 0 0] {air.expansion_per_k:.9g};\nTRef [0 0 0 1 0 0 0] {air.ambient_temperature_k:.9g};\n"
+        f"Pr [0 0 0 0 0 0 0] {air.prandtl:.9g};\nPrt [0 0 0 0 0 0 0] {TURBULENT_PRANDTL};\n"
+    )
+
+
+def _block(scene: Scene, cells: tuple[int, int, int]) -> str:
+    (x0, y0, z0), (x1, y1, z1) = scene.room.lower_m, scene.room.upper_m
+    corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+    vertices = "\n".join(f"    ({x:.9g} {y:.9g} {z:.9g})" for z in (z0, z1) for x, y in corners)
+    walls = "\n".join(
+        f"    {name} {{ type wall; faces ({face}); }}" for name, face in zip(WALLS, _FACES, strict=True)
+    )
+    counts = " ".join(map(str, cells))
+    return (
+        f"scale 1;\nvertices\n(\n{vertices}\n);\nblocks (hex (0 1 2 3 4 5 6 7) ({counts}) simpleGrading (1 1 1));\n"
+        f"boundary\n(\n{walls}\n);\n"
+    )
+
+
+def _sets(scene: Scene, openings: dict[str, Inlet | Outlet]) -> str:
+    """Faces whose centres lie in an opening."""
+    lines = []
+    for name, part in openings.items():
+        face = face_of(part.patch.wall)
+        low, high = [0.0] * 3, [0.0] * 3
+        low[face.axis] = high[face.axis] = face.place_m(scene.room)
+        low[face.axis] -= 1e-4
+        high[face.axis] += 1e-4
+        for axis, a, b in zip(face.along, part.patch.lower_m, part.patch.upper_m, strict=True):
+            low[axis], high[axis] = a, b
+        box = " ".join("({:.9g} {:.9g} {:.9g})".format(*corner) for corner in (low, high))
+        lines.append(f"    {{ name {name}; type faceSet; action new; source boxToFace; box {box}; }}\n")
+    return "actions\n(\n" + "".join(lines) + ");\n"
+
+
+def _header(kind: str, name: str) -> str:
+    return f"FoamFile {{ version 2.0; format ascii; class {kind}; object {name}; }}\n\n"
