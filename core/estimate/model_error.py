@@ -1,12 +1,15 @@
 """How wrong the model of the air is, by place: in units of what two closures, and two grids, differ in.
 
-    std^2 = nu / (nu - 2)  k^2  sum over pairs <d^2>,   d = (f_other - f) - D m,   m = C J^T R^-1 (s_other - s)
+    std^2 = nu / (nu - 2)  k^2  sum over pairs <d^2> / 2,   d = (f_other - f) - D m
+
+    m minimises |s_other - s - J m|^2 / R + |m|^2
 
 f is a field and s what the data would show of it, under one closure and another, or on two grids; m is how far the
 parameters would move if the data were the other model's, D and J the derivatives of f and s in them. So d is what the
-fit could not take up. <> is a mean over a correlation length. k is the ratio of what the fitted room leaves of the
-images, beyond their noise, to what d would leave: expected to be 1, known within a factor e, and moved by the
-likelihood. Where the images do not tell two models apart it stays 1.
+fit could not take up; two models that are equally wrong by themselves differ by sqrt(2) times as much as either is
+wrong. <> is a mean over a correlation length. k is the ratio of what the fitted room leaves of the images, beyond
+their noise, to what d / sqrt(2) would leave: expected to be 1, known within a factor e, and moved by the likelihood.
+Where the images do not tell two models apart it stays 1.
 
 d at a point is one draw of three components. An error whose variance is known from three squares has Student's t
 distribution with nu = 3 (Gosset, Biometrika 6 (1908)), whose standard deviation is sqrt(3) times as large.
@@ -28,6 +31,8 @@ from core.room.vertices import RoomFields
 Pair = tuple[RoomFields, RoomFields]
 
 _STUDENT = 3.0
+# Of the squared difference of two models, what either has wrong.
+_EACH = 0.5
 # Of the logarithm of k: within e^4 either way.
 _FARTHEST = 4.0
 
@@ -54,7 +59,7 @@ class ModelError(eqx.Module):
                 apart = apart - apart.mean((0, 1))
             # A mean over one correlation length: one standard deviation to each side.
             width = [0.5 * LENGTH_SHARE * n for n in apart.shape[:3]] + [0.0] * (apart.ndim - 3)
-            variance += ndimage.gaussian_filter(apart**2, width)
+            variance += _EACH * ndimage.gaussian_filter(apart**2, width)
         return self.size * np.sqrt(_STUDENT / (_STUDENT - 2.0) * variance)
 
 
@@ -70,7 +75,8 @@ def model_error(
     shown = [data.predicted(other) - data.predicted(one) for one, other in pairs]
     if len(posterior.deviation):
         weighted = jacobian.T / posterior.deviation**2
-        moved = np.stack([posterior.covariance @ weighted @ apart for apart in shown])
+        normal = weighted @ jacobian + np.eye(len(posterior.vector))
+        moved = np.stack([np.linalg.solve(normal, weighted @ apart) for apart in shown])
     else:
         moved = np.zeros((len(pairs), len(posterior.vector)))
     values, noise, group = data.values()
@@ -89,7 +95,7 @@ def size_of(
     if not len(left):
         return 1.0
     independent = len(left) / CORRELATED_DATA
-    power, noise_power, unit = np.mean(left**2), np.mean(noise), np.mean(np.sum(apart**2, axis=0))
+    power, noise_power, unit = np.mean(left**2), np.mean(noise), _EACH * np.mean(np.sum(apart**2, axis=0))
 
     def unlikely(log_size: float) -> float:
         variance = noise_power + np.exp(2.0 * log_size) * unit

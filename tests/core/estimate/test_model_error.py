@@ -25,7 +25,8 @@ def still(velocity_m_s: np.ndarray) -> RoomFields:
 def test_the_size_is_that_of_what_is_left_beyond_the_noise(true_size: float):
     draw = np.random.default_rng(3)
     noise, apart = np.full(40_000, 0.05**2), draw.normal(size=(2, 40_000))
-    left = true_size * 2**0.5 * draw.normal(size=40_000) + 0.05 * draw.normal(size=40_000)
+    # Two pairs: half of both is what the model has wrong.
+    left = true_size * draw.normal(size=40_000) + 0.05 * draw.normal(size=40_000)
 
     assert size_of(left, noise, apart) == pytest.approx(true_size, rel=0.02)
 
@@ -50,9 +51,10 @@ def test_a_model_that_explains_the_images_is_believed_more_than_one_that_does_no
         model_error(data, posterior, nothing, (pair,), room_of(found_k)).size for found_k in (4.0, 2.0)
     )
 
-    # Half of 4 K is left, where the two models differ by 1 K; these few windows move k a part of the way.
+    # Half of 4 K is left, where either of two models that differ by 1 K is wrong by 0.7 K; these few windows move k a
+    # part of the way to 2.8.
     assert right < 0.6
-    assert 1.4 < wrong < 2.0
+    assert 1.8 < wrong < 2.8
 
 
 def replace_excess(room: RoomFields, other: RoomFields) -> RoomFields:
@@ -68,27 +70,23 @@ def test_what_the_fit_takes_up_is_no_error():
     )
     # One parameter does to the room what the other closure does.
     derivatives = Derivatives(own, [faster], np.eye(1))
-    known = Posterior(np.zeros(1), 1e-6 * np.eye(1), np.full(len(data.values()[0]), 1.0))
-    jacobian = derivatives.per_deviation(data.predicted).T
-    exact = np.linalg.inv(jacobian.T @ jacobian)
+    size = len(data.values()[0])
+    sharp, blind = (Posterior(np.zeros(1), np.eye(1), np.full(size, std)) for std in (1e-9, 1.0))
 
-    taken = model_error(data, replace_covariance(known, exact), derivatives, ((own, faster),), own)
-    left = model_error(data, known, derivatives, ((own, faster),), own)
+    taken, left = (model_error(data, known, derivatives, ((own, faster),), own) for known in (sharp, blind))
 
-    assert taken.moved[0, 0] == pytest.approx(1.0, abs=1e-6)
     slopes = derivatives.per_deviation(lambda run: run.velocity_m_s)
-    assert taken.deviation("velocity_m_s", slopes).max() < 1e-5
+    assert taken.moved[0, 0] == pytest.approx(1.0, abs=1e-3)
+    assert taken.deviation("velocity_m_s", slopes).max() < 1e-3
+    # Data that tell nothing move nothing: the whole difference is left.
+    assert left.moved[0, 0] == pytest.approx(0.0, abs=1e-3)
     assert left.deviation("velocity_m_s", slopes).min() > 0.02
-
-
-def replace_covariance(posterior: Posterior, covariance: np.ndarray) -> Posterior:
-    return Posterior(posterior.vector, covariance, posterior.deviation)
 
 
 def test_intervals_hold_errors_of_the_kind_that_they_are_made_from():
     draw = np.random.default_rng(5)
-    one, error = (0.1 * draw.normal(size=(*SHAPE, 3)) for _ in range(2))
-    apart = ModelError(((still(np.zeros((*SHAPE, 3))), still(one)),), np.zeros((1, 0)), 1.0)
+    one, other, error = (0.1 * draw.normal(size=(*SHAPE, 3)) for _ in range(3))
+    apart = ModelError(((still(one), still(other)),), np.zeros((1, 0)), 1.0)
 
     std = apart.deviation("velocity_m_s", np.zeros((0, *SHAPE, 3)))
 
