@@ -107,12 +107,6 @@ class ViewPicture(WireModel):
     settings: list[SettingResource]
 
 
-class Retake(WireModel):
-    """Which camera takes its picture again, by the name of its view."""
-
-    view: str = Field(max_length=200)
-
-
 class CaptureResource(WireModel):
     """One capture. `interrupted` ones have no manifest and are never used as a measurement.
 
