@@ -44,7 +44,7 @@ def register(bench: typer.Typer) -> None:
         cells: Annotated[list[int] | None, typer.Option(help="Grids; 32 by default.")] = None,
         as_json: Annotated[bool, typer.Option("--json")] = False,
     ) -> None:
-        """The same room on the same cells by OpenFOAM, where it is installed."""
+        """A room by airlens' own march and by OpenFOAM (where it is installed), both from rest on the same cells."""
         volume = read_volume(truth)
         for n in cells or [32]:
             for row in rows(volume, n):
@@ -56,7 +56,7 @@ def rows(volume: RoomVolume, cells: int) -> Iterable[dict[str, Any]]:
 
     Raises BadInputError where OpenFOAM is not installed, fails, or the room holds what this case cannot.
     """
-    environment = _environment()
+    variables = environment()
     scene = room_scene(volume, RigOptions(), "surveyed")
     ours = cost_row(volume, cells, jacobian=False)
     yield {"by": "airlens", "cells": ours["cells"], "cpu_s": ours["run_cpu_s"], "u_rel": ours["u_rel"]}
@@ -65,9 +65,9 @@ def rows(volume: RoomVolume, cells: int) -> Iterable[dict[str, Any]]:
         counts = room(scene, cells, closure_name(scene)).grid.cells
         write_case(case, scene, counts, _EVERY, _MOST)
         for command in (["blockMesh"], ["topoSet"], ["createPatch", "-overwrite"]):
-            _run(command, case, environment)
+            _run(command, case, variables)
         began_s = time.perf_counter()
-        log = _run([SOLVER], case, environment)
+        log = _run([SOLVER], case, variables)
         wall_s = time.perf_counter() - began_s
         spent = {
             int(step): float(cpu_s)
@@ -100,7 +100,11 @@ def _error(folder: Path, scene: Scene, cells: tuple[int, int, int], volume: Room
     return float(score_solution(found, volume)["u"]["rel"])
 
 
-def _environment() -> dict[str, str]:
+def environment() -> dict[str, str]:
+    """Variables for OpenFOAM's programs; Debian's package finds its own files only where they name its folder.
+
+    Raises BadInputError where OpenFOAM is not installed.
+    """
     if shutil.which(SOLVER) is None:
         raise BadInputError(
             f"OpenFOAM's {SOLVER} is not on the path. Install OpenFOAM (Debian: openfoam), or source its bashrc."
@@ -111,8 +115,8 @@ def _environment() -> dict[str, str]:
     return here
 
 
-def _run(command: list[str], case: Path, environment: dict[str, str]) -> str:
-    done = subprocess.run(command, cwd=case, env=environment, capture_output=True, text=True, check=False)
+def _run(command: list[str], case: Path, variables: dict[str, str]) -> str:
+    done = subprocess.run(command, cwd=case, env=variables, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         last = "\n".join((done.stdout + done.stderr).strip().splitlines()[-12:])
         raise BadInputError(f"{command[0]} of OpenFOAM failed:\n{last}")
