@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from app.errors import BadInputError
+from app.report.openfoam import FACES, header
 from core.air import GRAVITY_M_S2
 from core.geometry import WALLS, WallName, face_of
 from core.known import stated_walls
@@ -15,8 +16,7 @@ from core.room.openings import supply_turbulence
 from core.scene import Heater, Inlet, Outlet, Scene
 
 SOLVER = "buoyantBoussinesqSimpleFoam"
-# Corners of the one block, and which of them each wall has, in the order of `WALLS`.
-_FACES = ("(0 4 7 3)", "(1 2 6 5)", "(0 1 5 4)", "(3 7 6 2)", "(0 3 2 1)", "(4 5 6 7)")
+_EVERY_WALL, _CALCULATED = f'"({"|".join(WALLS)})"', "type calculated; value uniform 0;"
 _SCHEMES = """ddtSchemes { default steadyState; }
 gradSchemes { default Gauss linear; grad(U) cellLimited Gauss linear 1; grad(T) cellLimited Gauss linear 1; }
 divSchemes
@@ -75,12 +75,12 @@ def write_case(case: Path, scene: Scene, cells: tuple[int, int, int], every: int
     for folder in ("0", "constant", "system"):
         (case / folder).mkdir()
     for path, text in texts.items():
-        (case / path).write_text(_header("dictionary", Path(path).name) + text)
+        (case / path).write_text(header("dictionary", Path(path).name) + text)
     gravity = f"dimensions [0 1 -2 0 0 0 0];\nvalue (0 0 -{GRAVITY_M_S2:.9g});\n"
-    (case / "constant/g").write_text(_header("uniformDimensionedVectorField", "g") + gravity)
+    (case / "constant/g").write_text(header("uniformDimensionedVectorField", "g") + gravity)
     for name, (dimensions, inside, boundary) in _fields(scene, openings).items():
         (case / "0" / name).write_text(
-            _header("volVectorField" if name == "U" else "volScalarField", name)
+            header("volVectorField" if name == "U" else "volScalarField", name)
             + f"dimensions {dimensions};\ninternalField uniform {inside};\nboundaryField\n{{\n"
             + "".join(f"    {patch} {{ {told} }}\n" for patch, told in boundary.items())
             + "}\n"
@@ -97,68 +97,63 @@ def read_field(path: Path, cells: tuple[int, int, int]) -> Float[np.ndarray, "nx
 
 def _fields(scene: Scene, openings: dict[str, Inlet | Outlet]) -> dict[str, tuple[str, str, dict[str, str]]]:
     """Dimensions, value inside and boundary of every field at rest."""
-    ambient_k = scene.air.ambient_temperature_k
-    plain, pushed = "type calculated; value uniform 0;", "type fixedFluxPressure; rho rhok; value uniform 0;"
+    return _flow(scene, openings) | _turbulence(openings)
 
-    def fixed(value: object) -> str:
-        return f"type fixedValue; value uniform {value};"
 
-    def leaving(value: object) -> str:
-        return f"type inletOutlet; inletValue uniform {value}; value uniform {value};"
-
-    def of(on_wall: str, on_inlet: Callable[[Inlet], str], on_outlet: str) -> dict[str, str]:
-        found = {f'"({"|".join(WALLS)})"': on_wall}
-        return found | {
-            name: on_inlet(part) if isinstance(part, Inlet) else on_outlet for name, part in openings.items()
-        }
-
-    def wall_function(kind: str, value: object = 0, more: str = "") -> str:
-        return f"type {kind};{more} value uniform {value};"
-
-    warm = of("", lambda part: fixed(f"{part.temperature_k:.7g}"), leaving(f"{ambient_k:.7g}"))
-    warm = {name: _wall_heat(scene, name) for name in WALLS} | {name: warm[name] for name in openings}
+def _flow(scene: Scene, openings: dict[str, Inlet | Outlet]) -> dict[str, tuple[str, str, dict[str, str]]]:
+    ambient_k = f"{scene.air.ambient_temperature_k:.7g}"
+    pushed = "type fixedFluxPressure; rho rhok; value uniform 0;"
+    velocity = _on(
+        openings,
+        lambda part: _fixed("({:.7g} {:.7g} {:.7g})".format(*part.velocity_m_s)),
+        "type pressureInletOutletVelocity; value uniform (0 0 0);",
+    )
+    warm = _on(openings, lambda part: _fixed(f"{part.temperature_k:.7g}"), _leaving(ambient_k))
     return {
-        "U": (
-            "[0 1 -1 0 0 0 0]",
-            "(0 0 0)",
-            of(
-                "type noSlip;",
-                lambda part: fixed("({:.7g} {:.7g} {:.7g})".format(*part.velocity_m_s)),
-                "type pressureInletOutletVelocity; value uniform (0 0 0);",
-            ),
-        ),
-        "T": ("[0 0 0 1 0 0 0]", f"{ambient_k:.7g}", warm),
-        "p": ("[0 2 -2 0 0 0 0]", "0", {'".*"': plain}),
-        "p_rgh": ("[0 2 -2 0 0 0 0]", "0", of(pushed, lambda part: pushed, fixed(0))),
-        "k": (
+        "U": ("[0 1 -1 0 0 0 0]", "(0 0 0)", {_EVERY_WALL: "type noSlip;"} | velocity),
+        "T": ("[0 0 0 1 0 0 0]", ambient_k, {name: _wall_heat(scene, name) for name in WALLS} | warm),
+        "p": ("[0 2 -2 0 0 0 0]", "0", {'".*"': _CALCULATED}),
+        "p_rgh": (
             "[0 2 -2 0 0 0 0]",
-            "0.001",
-            of(
-                wall_function("kqRWallFunction", 0.001),
-                lambda part: fixed(f"{supply_turbulence(part)[0]:.7g}"),
-                leaving(0.001),
-            ),
+            "0",
+            {_EVERY_WALL: pushed} | _on(openings, lambda part: pushed, _fixed("0")),
         ),
+    }
+
+
+def _turbulence(openings: dict[str, Inlet | Outlet]) -> dict[str, tuple[str, str, dict[str, str]]]:
+    def supplied(which: int, at_rest: str) -> dict[str, str]:
+        return _on(openings, lambda part: _fixed(f"{supply_turbulence(part)[which]:.7g}"), _leaving(at_rest))
+
+    def on_walls(kind: str, value: str = "0", more: str = "") -> dict[str, str]:
+        return {_EVERY_WALL: f"type {kind};{more} value uniform {value};"}
+
+    follows = _on(openings, lambda part: _CALCULATED, _CALCULATED)
+    heat = on_walls("alphatJayatillekeWallFunction", more=f" Prt {TURBULENT_PRANDTL};")
+    return {
+        "k": ("[0 2 -2 0 0 0 0]", "0.001", on_walls("kqRWallFunction", "0.001") | supplied(0, "0.001")),
         "epsilon": (
             "[0 2 -3 0 0 0 0]",
             "0.0005",
-            of(
-                wall_function("epsilonWallFunction", 0.0005),
-                lambda part: fixed(f"{supply_turbulence(part)[1]:.7g}"),
-                leaving(0.0005),
-            ),
+            on_walls("epsilonWallFunction", "0.0005") | supplied(1, "0.0005"),
         ),
-        "nut": ("[0 2 -1 0 0 0 0]", "0", of(wall_function("nutkWallFunction"), lambda part: plain, plain)),
-        "alphat": (
-            "[0 2 -1 0 0 0 0]",
-            "0",
-            of(
-                wall_function("alphatJayatillekeWallFunction", more=f" Prt {TURBULENT_PRANDTL};"),
-                lambda part: plain,
-                plain,
-            ),
-        ),
+        "nut": ("[0 2 -1 0 0 0 0]", "0", on_walls("nutkWallFunction") | follows),
+        "alphat": ("[0 2 -1 0 0 0 0]", "0", heat | follows),
     }
+
+
+def _on(
+    openings: dict[str, Inlet | Outlet], on_inlet: Callable[[Inlet], str], on_outlet: str
+) -> dict[str, str]:
+    return {name: on_inlet(part) if isinstance(part, Inlet) else on_outlet for name, part in openings.items()}
+
+
+def _fixed(value: str) -> str:
+    return f"type fixedValue; value uniform {value};"
+
+
+def _leaving(value: str) -> str:
+    return f"type inletOutlet; inletValue uniform {value}; value uniform {value};"
 
 
 def _wall_heat(scene: Scene, name: WallName) -> str:
@@ -167,7 +162,7 @@ def _wall_heat(scene: Scene, name: WallName) -> str:
         raise BadInputError(f"The heat through {name} is not known: take a room whose walls are all stated.")
     if wall.thermal == "adiabatic" or wall.temperature_k is None:
         return "type zeroGradient;"
-    return f"type fixedValue; value uniform {wall.temperature_k:.7g};"
+    return _fixed(f"{wall.temperature_k:.7g}")
 
 
 def _transport(scene: Scene) -> str:
@@ -184,7 +179,8 @@ def _block(scene: Scene, cells: tuple[int, int, int]) -> str:
     corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
     vertices = "\n".join(f"    ({x:.9g} {y:.9g} {z:.9g})" for z in (z0, z1) for x, y in corners)
     walls = "\n".join(
-        f"    {name} {{ type wall; faces ({face}); }}" for name, face in zip(WALLS, _FACES, strict=True)
+        f"    {name} {{ type wall; faces (({' '.join(map(str, face))})); }}"
+        for name, face in zip(WALLS, FACES, strict=True)
     )
     counts = " ".join(map(str, cells))
     return (
@@ -207,7 +203,3 @@ def _sets(scene: Scene, openings: dict[str, Inlet | Outlet]) -> str:
         box = " ".join("({:.9g} {:.9g} {:.9g})".format(*corner) for corner in (low, high))
         lines.append(f"    {{ name {name}; type faceSet; action new; source boxToFace; box {box}; }}\n")
     return "actions\n(\n" + "".join(lines) + ");\n"
-
-
-def _header(kind: str, name: str) -> str:
-    return f"FoamFile {{ version 2.0; format ascii; class {kind}; object {name}; }}\n\n"

@@ -22,7 +22,7 @@ from core.result import Solution
 
 # The corners of a block, and which of them each face has, in the order of `WALLS`.
 _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
-_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
+FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
 _FIELDS = {"T": "[0 0 0 1 0 0 0]", "p": "[0 2 -2 0 0 0 0]", "U": "[0 1 -1 0 0 0 0]"}
 # What checkMesh and postProcess ask for; no equation is solved.
 _SCHEMES = (
@@ -55,8 +55,8 @@ def write_openfoam(
         case.writestr(_executable("case/Allrun"), _ALLRUN, zipfile.ZIP_DEFLATED)
         case.writestr("case/system/blockMeshDict", _mesh(blocks, patches))
         case.writestr("case/system/controlDict", _control())
-        case.writestr("case/system/fvSchemes", _header("dictionary", "fvSchemes") + _SCHEMES)
-        case.writestr("case/system/fvSolution", _header("dictionary", "fvSolution"))
+        case.writestr("case/system/fvSchemes", header("dictionary", "fvSchemes") + _SCHEMES)
+        case.writestr("case/system/fvSolution", header("dictionary", "fvSolution"))
         case.writestr("case/0/T", field("T", solution.temperature_k[..., None], warm))
         if solution.velocity_m_s is not None:
             case.writestr("case/0/U", field("U", solution.velocity_m_s, fast))
@@ -98,12 +98,13 @@ def _executable(name: str) -> zipfile.ZipInfo:
     return entry
 
 
-def _header(kind: str, name: str) -> str:
+def header(kind: str, name: str) -> str:
+    """What each of OpenFOAM's files begins with."""
     return f"FoamFile {{ version 2.0; format ascii; class {kind}; object {name}; }}\n\n"
 
 
 def _control() -> str:
-    return _header("dictionary", "controlDict") + (
+    return header("dictionary", "controlDict") + (
         "application none;\nstartFrom startTime;\nstartTime 0;\nstopAt endTime;\nendTime 0;\n"
         "deltaT 1;\nwriteControl timeStep;\nwriteInterval 1;\nwritePrecision 9;\n"
     )
@@ -127,11 +128,11 @@ def _mesh(blocks: Blocks, patches: Sequence[MeshPatch]) -> str:
     )
     boundary = "\n".join(
         f"    {patch.name}\n    {{\n        type wall;\n        faces\n        (\n"
-        + "\n".join(f"            ({numbers(side.block, _FACES[side.number])})" for side in patch.sides)
+        + "\n".join(f"            ({numbers(side.block, FACES[side.number])})" for side in patch.sides)
         + "\n        );\n    }"
         for patch in patches
     )
-    return _header("dictionary", "blockMeshDict") + (
+    return header("dictionary", "blockMeshDict") + (
         f"scale 1;\nvertices\n(\n{vertices}\n);\nblocks\n(\n{hexes}\n);\nboundary\n(\n{boundary}\n);\n"
     )
 
@@ -148,7 +149,7 @@ def _field(name: str, rows: Float[np.ndarray, "cells parts"], boundary: Sequence
     vector = rows.shape[1] == 3
     words = [f"({a:.7g} {b:.7g} {c:.7g})" for a, b, c in rows] if vector else [f"{v:.7g}" for v in rows[:, 0]]
     kind = "vector" if vector else "scalar"
-    return _header(f"vol{kind.capitalize()}Field", name) + (
+    return header(f"vol{kind.capitalize()}Field", name) + (
         f"dimensions {_FIELDS[name]};\ninternalField nonuniform List<{kind}>\n{len(words)}\n(\n"
         + "\n".join(words)
         + "\n);\nboundaryField\n{\n"

@@ -21,7 +21,7 @@ import numpy as np
 
 from core.estimate.observation import sample
 from core.estimate.prior import room_prior
-from core.geometry import Box, looking_along_y
+from core.geometry import WALLS, Box, looking_along_y
 from core.problem import Problem
 from core.room.forward import carried_over, room, room_fields
 from core.room.march import MarchSettings, march
@@ -58,7 +58,6 @@ MEASURED = {
 def scene() -> Scene:
     """The room as its authors state it; no wall passes heat."""
     camera = looking_along_y(position_m=(4.5, -8.0, 1.5), width_px=200, height_px=100, focal_px=150.0)
-    walls = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
     return Scene(
         room=ROOM,
         views=(View(camera=camera),),
@@ -71,7 +70,7 @@ def scene() -> Scene:
                 turbulence_intensity=0.04,
             ),
             Outlet(patch=Patch(wall="x_max", lower_m=(0.0, 0.0), upper_m=(3.0, 0.48))),
-            *(Wall(wall=wall, thermal="adiabatic") for wall in walls),
+            *(Wall(wall=wall, thermal="adiabatic") for wall in WALLS),
         ),
     )
 
