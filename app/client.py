@@ -311,6 +311,16 @@ class Client:
         body = {"role": role, "frames": frames, **settings}
         return self._ask(DeskResource, "POST", f"/experiments/{experiment}/captures", body)
 
+    def retake_capture(
+        self, experiment: str, capture: str, view: str | None = None, **stated: Any
+    ) -> DeskResource:
+        """Begin to take one camera's picture of a capture again, alone: `view` by its name, or the missing one.
+
+        `stated` are the ambient temperature and the minutes on, as in `Retake`.
+        """
+        path = f"/experiments/{experiment}/captures/{capture}/retake"
+        return self._ask(DeskResource, "POST", path, {"view": view, **stated})
+
     def import_captures(
         self,
         experiment: str,

@@ -50,13 +50,15 @@ def retake(
     number: int,
     told: Conditions = UNTOLD,
     watch: BurstWatch = UNWATCHED,
+    name: str | None = None,
 ) -> TakenBurst:
-    """Take the burst of one view by its camera, as the capture asked for it. Raises AirlensError, DeviceError."""
+    """Take the burst of one view by its camera, as the capture asked for it, into the folder of `name_of_retake`.
+
+    Raises AirlensError, DeviceError.
+    """
     plan, whole = parts.plan, not parts.missing
     check_room(experiment.folder, plan, camera.info)
-    folder = (
-        experiment.captures_folder / new_id(experiment.captures_folder, plan.role) if whole else parts.folder
-    )
+    folder = experiment.captures_folder / (name or name_of_retake(experiment, parts))
     recorder = CaptureRecorder(folder, plan)
     watch.begun(folder)
     try:
@@ -76,6 +78,17 @@ def retake(
     except BaseException:
         recorder.leave()
         raise
+
+
+def name_of_retake(experiment: Experiment, parts: CaptureParts) -> str:
+    """The capture's own name where it lacks a view, else a new one."""
+    return parts.folder.name if parts.missing else new_id(experiment.captures_folder, parts.plan.role)
+
+
+def may_retake(parts: CaptureParts) -> bool:
+    """Whether one view of it can be taken alone: of several, by this rig, and not of bursts that belong together."""
+    several = len(parts.names) > 1 and parts.origin.get("rig") != "imported"
+    return several and bool(parts.missing or not {"sequence", "series"} & set(parts.origin))
 
 
 def place_of(origin: Mapping[str, Any]) -> int | None:

@@ -15,14 +15,16 @@ from pathlib import Path
 from typing import Any
 
 from app.capture.burst import Order, TakenBurst, take_order
+from app.capture.retake import name_of_retake, place_of, retake, to_retake
 from app.capture.watched import BurstWatch, OnAbort
 from app.errors import AirlensError
 from app.experiment.folder import Experiment, new_id
 from app.experiment.recorder import release, reserve
+from app.rig.conditions import Conditions
 from app.rig.live_camera import LiveCamera
 from app.rig.open import AirState, air_of, open_camera
 from app.states import StateMachine
-from drivers.burst import BurstOutcome, Progress
+from drivers.burst import BurstOutcome, CapturePlan, Progress
 from drivers.errors import DeviceBusyError, DeviceError
 from drivers.protocols import Camera
 
@@ -94,11 +96,17 @@ class DeskStatus:
 
 @dataclass(eq=False)
 class _Run:
-    """One order that is carried out; `stop` says what becomes of the frames once it is to end."""
+    """One order that is carried out; `stop` says what becomes of the frames once it is to end.
+
+    `takes` takes it with the camera of `view`, whose simulated mount stands at `moment`, and says how it ended.
+    """
 
     experiment: Experiment
-    order: Order
+    plan: CapturePlan
     name: str
+    takes: Callable[[Camera, BurstWatch], tuple[CaptureEvent, str]]
+    view: int = 0
+    moment: int | None = None
     stop: OnAbort | None = None
     thread: threading.Thread | None = None
 
@@ -106,14 +114,14 @@ class _Run:
 class CaptureDesk:
     """Takes captures with the camera of `live`; `tell(kind, body)` hears of state and progress, and never raises.
 
-    `opener` opens the camera of an experiment.
+    `opener` opens the camera of an experiment's view.
     """
 
     def __init__(
         self,
         live: LiveCamera,
         tell: Callable[[str, Mapping[str, Any]], object],
-        opener: Callable[[Experiment, AirState], Camera] = open_camera,
+        opener: Callable[[Experiment, AirState, int, int | None], Camera] = open_camera,
     ) -> None:
         self._live, self._tell, self._opener = live, tell, opener
         self._status = DeskStatus()
@@ -136,18 +144,44 @@ class CaptureDesk:
             plan = order.plan
             name = new_id(experiment.captures_folder, plan.role)
             reserve(experiment.captures_folder / name, plan)
-            run = _Run(experiment, order, name)
-            run.thread = threading.Thread(target=self._run, args=(run,), name="capture", daemon=True)
-            self._now = run
-            folder = experiment.folder.name
-            status = DeskStatus(state, folder, name, plan.role, plan.frames, order.bursts)
-            self._status = status
-            try:
-                run.thread.start()
-            except RuntimeError as error:  # no more threads
-                release(experiment.captures_folder / name)
-                self._end(run, CaptureEvent.fail, f"{error}. Close other programs, then take it again.")
-                return self._status
+
+            def takes(camera: Camera, watch: BurstWatch) -> tuple[CaptureEvent, str]:
+                return _ending(order, take_order(camera, experiment, order, watch, name))
+
+            return self._begin(state, _Run(experiment, plan, name, takes), order.bursts)
+
+    def retake(self, experiment: Experiment, capture: str, view: str | None, told: Conditions) -> DeskStatus:
+        """Take one camera's picture of a capture again, alone, and return at once.
+
+        Raises BadInputError for a view that cannot be taken alone, DeviceBusyError while a capture runs.
+        """
+        with self._lock:
+            state = CAPTURE.after(self._status.state, CaptureEvent.start)
+            parts, number = to_retake(experiment, capture, view)
+            plan, name = parts.plan, name_of_retake(experiment, parts)
+            if name != capture:
+                reserve(experiment.captures_folder / name, plan)
+
+            def takes(camera: Camera, watch: BurstWatch) -> tuple[CaptureEvent, str]:
+                taken = retake(camera, experiment, parts, number, told, watch, name)
+                return _ending(Order(plan), [taken])
+
+            return self._begin(state, _Run(experiment, plan, name, takes, number, place_of(parts.origin)), 1)
+
+    def _begin(self, state: DeskState, run: _Run, bursts: int) -> DeskStatus:
+        """Let a run go on by itself; the desk is locked meanwhile."""
+        run.thread = threading.Thread(target=self._run, args=(run,), name="capture", daemon=True)
+        self._now = run
+        status = DeskStatus(
+            state, run.experiment.folder.name, run.name, run.plan.role, run.plan.frames, bursts
+        )
+        self._status = status
+        try:
+            run.thread.start()
+        except RuntimeError as error:  # no more threads
+            release(run.experiment.captures_folder / run.name)
+            self._end(run, CaptureEvent.fail, f"{error}. Close other programs, then take it again.")
+            return self._status
         self._tell_status()
         return status
 
@@ -198,10 +232,9 @@ class CaptureDesk:
             lambda: run.stop,
             self._following(run, self._begun),
         )
-        self._connect(run.experiment, air_of(run.order.plan.role))
+        self._connect(run)
         with self._live.using() as camera:
-            taken = take_order(camera, run.experiment, run.order, watch, run.name)
-        return _ending(run.order, taken)
+            return run.takes(camera, watch)
 
     def _following(self, run: _Run, act: Callable[[Any], object]) -> Callable[[Any], object]:
         """Let a run that was left behind tell nothing more."""
@@ -223,17 +256,17 @@ class CaptureDesk:
             self._status = replace(self._status, state=state, reason=reason)
         self._tell_status()
 
-    def _connect(self, experiment: Experiment, air: AirState) -> None:
+    def _connect(self, run: _Run) -> None:
         """Open the rig's camera unless it is; a simulated room is told what its air does."""
-        source = experiment.folder.name
+        source, air = run.experiment.folder.name, air_of(run.plan.role)
+        simulated = run.experiment.settings.rig.camera_kind == "simulated"
         open_for = (self._live.status.experiment, self._live.air, self._live.view)
-        simulated = experiment.settings.rig.camera_kind == "simulated"
-        if self._live.status.state.value != "ready" or open_for != (
-            source,
-            air if simulated else self._live.air,
-            0,
-        ):
-            self._live.open(source, lambda: self._opener(experiment, air), air)
+        wanted = (source, air if simulated else self._live.air, run.view)
+        again = self._live.status.state.value != "ready" or open_for != wanted
+        if again or (simulated and run.moment is not None):
+            self._live.open(
+                source, lambda: self._opener(run.experiment, air, run.view, run.moment), air, run.view
+            )
 
     def _begun(self, folder: Path) -> None:
         now = self._status

@@ -50,6 +50,17 @@ class NewCapture(WireModel):
     minutes_on: float | None = Field(default=None, ge=0, le=1e6)
 
 
+class Retake(WireModel):
+    """One camera's picture of a capture taken again, alone, as it was asked for: `view` is its name.
+
+    Left out, it is the one that is missing. `ambient_temperature_k` and `minutes_on` are as in NewCapture.
+    """
+
+    view: str | None = Field(default=None, max_length=200)
+    ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
+    minutes_on: float | None = Field(default=None, ge=0, le=1e6)
+
+
 class RolePictures(WireModel):
     """Uploaded pictures of one role: each upload is a picture, or a TIFF of many.
 
@@ -111,7 +122,8 @@ class CaptureResource(WireModel):
     """One capture. `interrupted` ones have no manifest and are never used as a measurement.
 
     `views` are the cameras' pictures, each with its verdicts; frames, size, verdicts and settings beside it are those
-    of the first. `missing` names the views that an interrupted one waits for.
+    of the first. `missing` names the views that an interrupted one waits for; `retakes` says whether one view of it
+    can be taken alone.
 
     `sequence` is the same for all bursts of one sequence, and none for a single burst.
     `reason` says why a `broken` one cannot be read. `revision` goes into the `If-Match` of a change of its notes.
@@ -130,6 +142,7 @@ class CaptureResource(WireModel):
     revision: str
     views: list[ViewPicture]
     missing: list[str]
+    retakes: bool = False
     sequence: str | None = None
     reason: str = ""
 

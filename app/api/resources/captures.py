@@ -17,6 +17,7 @@ from app.api.models.captures import (
     DeskResource,
     NewCapture,
     NewImport,
+    Retake,
 )
 from app.api.services import Given, Services
 from app.api.wire.bodies import body
@@ -59,6 +60,18 @@ def start_capture(given: Given, experiment: Identifier, new: NewCapture) -> Desk
     """Begin a capture; it goes on when the browser is closed."""
     found = given.confirmed.check(given.folders.open(experiment))
     return DeskResource.of(given.desk.start(found, order_of(new)))
+
+
+@router.post("/experiments/{experiment}/captures/{capture}/retake", status_code=202)
+def retake_capture(given: Given, experiment: Identifier, capture: Identifier, wanted: Retake) -> DeskResource:
+    """Begin to take one camera's picture of a capture again, alone; the other cameras' stay.
+
+    A capture that lacks the view is completed; of one that is whole a new one is made.
+    """
+    found = given.confirmed.check(given.folders.open(experiment))
+    folder = _capture(given, experiment, capture)
+    told = conditions_in(wanted.model_dump())
+    return DeskResource.of(given.desk.retake(found, folder.name, wanted.view, told))
 
 
 def order_of(new: NewCapture) -> Order:
@@ -145,10 +158,7 @@ def change_capture(
 @router.delete("/experiments/{experiment}/captures/{capture}", status_code=204)
 def discard_capture(given: Given, experiment: Identifier, capture: Identifier) -> None:
     """Remove a capture, finished or interrupted, with everything in it."""
-    parent = given.folders.folder(experiment) / "captures"
-    found = child(parent, capture)
-    if found is None:
-        raise ApiError("not_found", f"Experiment {experiment!r} has no capture {capture!r}.")
+    found = _capture(given, experiment, capture)
     if given.desk.status.state.value == "running" and given.desk.status.capture == capture:
         raise ApiError("conflict", "This capture is being taken.", "Abort it first.")
     given.folders.remove(found)
@@ -181,6 +191,14 @@ def read_image(
     """Return the mean image as numbers, as fractions of full scale."""
     packed = pack(_image(given, experiment, capture, view).mean, encoding)
     return Response(packed.content, media_type="application/octet-stream", headers=packed.headers)
+
+
+def _capture(given: Services, experiment: str, capture: str) -> Path:
+    """The folder of a capture, finished or interrupted."""
+    found = child(given.folders.folder(experiment) / "captures", capture)
+    if found is None:
+        raise ApiError("not_found", f"Experiment {experiment!r} has no capture {capture!r}.")
+    return found
 
 
 def _image(given: Services, experiment: str, capture: str, view: int) -> BurstImage:

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from app.api.folders import shown_name
 from app.api.models.captures import CaptureResource, SettingResource, VerdictResource, ViewPicture
+from app.capture.retake import may_retake
 from app.errors import BadInputError
 from app.experiment.capture_parts import parts_of
 from app.experiment.folder import read_manifest, revision_of
@@ -49,6 +50,7 @@ def _shown(folder: Path, manifest: dict[str, Any], names: Sequence[str]) -> Capt
         sequence=manifest.get("origin", {}).get("sequence", {}).get("id"),
         views=views,
         missing=[],
+        retakes=may_retake(parts_of(folder, names)),
     )
 
 
@@ -82,7 +84,9 @@ def _interrupted(folder: Path, names: Sequence[str]) -> CaptureResource:
     with reading(folder, "Discard the capture, or restore it from a copy."):
         views = [_picture(view, names[number]) for number, view in sorted(parts.views.items())]
     bare = _bare(folder, "interrupted", parts.role or None)
-    return bare.model_copy(update={"views": views, "missing": list(parts.missing)})
+    return bare.model_copy(
+        update={"views": views, "missing": list(parts.missing), "retakes": may_retake(parts)}
+    )
 
 
 def _bare(

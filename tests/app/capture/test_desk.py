@@ -53,7 +53,7 @@ def order(frames: int = 2) -> Order:
 def desk_of(tmp_path: Path, make: Callable[[], SimulatedCamera] | None = None) -> CaptureDesk:
     tell = News(Ledger(tmp_path / "jobs")).tell
     camera = make or (lambda: SimulatedCamera(lambda: VIEW, seed=1))
-    return CaptureDesk(LiveCamera(tell), tell, lambda experiment, air: camera())
+    return CaptureDesk(LiveCamera(tell), tell, lambda experiment, air, view, moment: camera())
 
 
 def taken(desk: CaptureDesk, experiment: Experiment) -> DeskState:

@@ -268,6 +268,11 @@ class Bench {
     this.desk = await ask("POST /experiments/{experiment}/captures", { experiment: this.here }, { role, frames });
   }
 
+  async retake(capture: string, view: string): Promise<void> {
+    const named = { experiment: this.here, capture };
+    this.desk = await ask("POST /experiments/{experiment}/captures/{capture}/retake", named, { view });
+  }
+
   async abort(discard: boolean): Promise<void> {
     this.desk = await ask("POST /captures/running/abort", {}, { discard });
     await this.refreshExperiment();

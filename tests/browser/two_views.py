@@ -1,0 +1,30 @@
+"""An experiment of two cameras for the page's tests: the packaged room's back wall and its right one."""
+
+import shutil
+
+from app.experiment.folder import TRUTH_FILE, ExperimentSettings, create_experiment, new_folder
+from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
+from app.files.durable import write_text
+from app.simulate.stated_bundle import bundle_as_stated
+from app.volume.file import read_volume
+from app.volume.sample import SAMPLE_ROOM
+from app.volume.scene import RigOptions, room_scene
+from calibration.bundle import to_json
+from tests.browser.conftest import Station
+
+VIEWS = ("camera", "camera at x_max")
+
+
+def two_views(station: Station, camera_px: int = 192) -> str:
+    """Make it, calibrated, among the station's experiments; return its id."""
+    options = RigOptions(camera_px=(camera_px, camera_px * 3 // 4), walls=("y_max", "x_max"))
+    scene = room_scene(read_volume(SAMPLE_ROOM), options, "surveyed")
+    rig = RigSettings(camera=SimulatedCameraSettings())
+    settings = ExperimentSettings(title="Two cameras", information="surveyed", rig=rig, scene=scene)
+
+    def fill(folder) -> None:
+        made = create_experiment(folder, settings)
+        shutil.copyfile(SAMPLE_ROOM, folder / TRUTH_FILE)
+        write_text(made.bundle_path, to_json(bundle_as_stated(scene)))
+
+    return new_folder(station.app.state.services.folders.root, "simulated", fill).name
