@@ -8,6 +8,8 @@ lamp's reflection. Such windows are refused. Source: Lucas & Kanade (1981), Gaus
 Cost: two 21-tap filters and one matrix of products a window; 0.1 ms for each window that moved far.
 """
 
+from functools import cached_property
+
 import jax
 import numpy as np
 from jaxtyping import Bool, Float
@@ -46,26 +48,48 @@ def measure_shift(
     unit squared; each window takes its mean. Without `follow` every window is taken to have hardly moved. Raises
     SettingError for unequal sizes, an image smaller than one window, or no noise.
     """
-    check_pair(reference_image, flow_image, window_px)
-    if not (np.isfinite(difference_variance).all() and np.min(difference_variance) > 0):
-        raise SettingError(
-            f"The images' noise has a variance down to {np.min(difference_variance):g}; expected finite values "
-            "above 0. State full_well_e, read_noise_e and bits of the camera."
+    return ShiftOfPair(reference_image, flow_image, difference_variance, window_px).measured(follow=follow)
+
+
+class ShiftOfPair:
+    """Two pictures to be compared, as `measure_shift` takes them: what is worked out once serves both answers."""
+
+    def __init__(
+        self,
+        reference_image: AnyImage,
+        flow_image: AnyImage,
+        difference_variance: AnyImage | float,
+        window_px: int,
+    ) -> None:
+        check_pair(reference_image, flow_image, window_px)
+        if not (np.isfinite(difference_variance).all() and np.min(difference_variance) > 0):
+            raise SettingError(
+                f"The images' noise has a variance down to {np.min(difference_variance):g}; expected finite values "
+                "above 0. State full_well_e, read_noise_e and bits of the camera."
+            )
+        self._reference, self._flow, self._window_px = reference_image, flow_image, window_px
+        variance = np.broadcast_to(np.asarray(difference_variance, float), reference_image.shape)
+        self._variance = _blocks(variance, window_px).mean(axis=(1, 2))
+
+    def measured(self, *, follow: bool) -> ShiftMeasurement:
+        """The shift of every window; without `follow` as if each had hardly moved."""
+        fit, centres = self._hardly_moved, window_centres(self._reference.shape, self._window_px)
+        far = np.abs(fit.displacement_px).max(axis=1) > _SMALL_PX
+        if follow and (far.any() or _lost(fit).any()):
+            search = WindowSearch(self._reference, self._flow, self._window_px)
+            fit = _followed(fit, far, search, centres, self._variance)
+        light = float(np.mean(self._flow) / max(np.mean(self._reference), 1e-9))
+        return ShiftMeasurement(
+            centres_px=centres,
+            displacement_px=fit.displacement_px,
+            information_per_px2=fit.information_per_px2,
+            window_px=self._window_px,
+            refused=_unlike(fit, light),
         )
-    centres = window_centres(reference_image.shape, window_px)
-    variance = np.broadcast_to(np.asarray(difference_variance, float), reference_image.shape)
-    variance = _blocks(variance, window_px).mean(axis=(1, 2))
-    fit = _hardly_moved(reference_image, flow_image, variance, window_px)
-    far = np.abs(fit.displacement_px).max(axis=1) > _SMALL_PX
-    if follow and (far.any() or _lost(fit).any()):
-        fit = _followed(fit, far, WindowSearch(reference_image, flow_image, window_px), centres, variance)
-    return ShiftMeasurement(
-        centres_px=centres,
-        displacement_px=fit.displacement_px,
-        information_per_px2=fit.information_per_px2,
-        window_px=window_px,
-        refused=_unlike(fit, light=float(np.mean(flow_image) / max(np.mean(reference_image), 1e-9))),
-    )
+
+    @cached_property
+    def _hardly_moved(self) -> WindowFit:
+        return _hardly_moved(self._reference, self._flow, self._variance, self._window_px)
 
 
 def _hardly_moved(

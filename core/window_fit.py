@@ -53,11 +53,14 @@ def derivative_filter(half_taps: int = 10, highest_cycles_per_px: float = 0.4) -
 
 def gradients(image: Float[np.ndarray, "*batch rows cols"]) -> tuple[np.ndarray, np.ndarray]:
     """Slope along columns and along rows, per px; edges are repeated."""
-    taps = derivative_filter()
-    return (
-        ndimage.correlate1d(image, taps, axis=-1, mode="nearest"),
-        ndimage.correlate1d(image, taps, axis=-2, mode="nearest"),
-    )
+    return gradient(image, -1), gradient(image, -2)
+
+
+def gradient(
+    image: Float[np.ndarray, "*batch rows cols"], axis: int
+) -> Float[np.ndarray, "*batch rows cols"]:
+    """Slope along one axis, per px; edges are repeated."""
+    return ndimage.correlate1d(image, derivative_filter(), axis=axis, mode="nearest")
 
 
 def window_products(

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
-from core.window_fit import WindowFit, derivative_filter, fit_windows, gradients, window_products
+from core.window_fit import WindowFit, derivative_filter, fit_windows, gradient, window_products
 
 # The spline's own error in a texture with a period of five pixels is below 1e-3 px.
 _SPLINE_ORDER = 5
@@ -76,18 +76,27 @@ class WindowSearch:
         self, there: np.ndarray, first_px: np.ndarray, at_px: np.ndarray, variance: np.ndarray
     ) -> WindowFit:
         px, margin = self.window_px, self._margin
-        reach = np.arange(px + 2 * margin) - margin
-        rows = (first_px[:, 1] - at_px[:, 1])[:, None, None] + reach[:, None]
-        columns = (first_px[:, 0] - at_px[:, 0])[:, None, None] + reach
-        places = np.broadcast_arrays(rows, columns)
-        moved = ndimage.map_coordinates(
-            self._spline, places, order=_SPLINE_ORDER, prefilter=False, mode="nearest"
-        )
+        moved = self._moved(first_px - at_px - margin, px + 2 * margin)
         mean = 0.5 * (moved + there)
-        inner = (slice(None), slice(margin, margin + px), slice(margin, margin + px))
-        slopes = gradients(mean)
-        products = window_products((slopes[0][inner], slopes[1][inner]), mean[inner], (there - moved)[inner])
+        inside = slice(margin, margin + px)
+        inner = (slice(None), inside, inside)
+        # A slope along one axis needs no margin along the other.
+        slopes = gradient(mean[:, inside], -1)[..., inside], gradient(mean[..., inside], -2)[:, inside]
+        products = window_products(slopes, mean[inner], (there - moved)[inner])
         return fit_windows(products, variance, px * px)
+
+    def _moved(self, first_px: Float[np.ndarray, "windows 2"], size: int) -> np.ndarray:
+        """Squares of the reference between its pixels, from `first_px` (column, row) on; each moves as a whole.
+
+        So the spline's weights are the same in all rows of a square, and in all its columns. Beyond the picture's
+        edge the last pixel is repeated.
+        """
+        whole = np.floor(first_px).astype(int)
+        taps = _spline_taps((first_px - whole).astype(np.float64))
+        reach = size + _SPLINE_ORDER
+        near = _patches(self._spline, whole - _SPLINE_ORDER // 2, reach)
+        down = _weighted(near, taps[:, 1], -2, size)
+        return _weighted(down, taps[:, 0], -1, size)
 
     def _whole_pixels(self, first_px: np.ndarray, reach_px: int) -> np.ndarray:
         px, wide = self.window_px, self.window_px + 2 * reach_px
@@ -102,6 +111,29 @@ class WindowSearch:
         row, column = np.unravel_index(alike.reshape(len(alike), -1).argmax(axis=1), alike.shape[1:])
         # The flow picture at x shows the reference at x - d.
         return reach_px - np.stack([column, row], axis=1).astype(float)
+
+
+def _spline_taps(fraction: Float[np.ndarray, "windows 2"]) -> Float[np.ndarray, "windows 2 6"]:
+    """Weights of the six coefficients about a place: the quintic B-spline at their distances from it."""
+    t = np.abs(np.arange(-2, 4) - fraction[..., None])
+    near = (66 - 60 * t**2 + 30 * t**4 - 10 * t**5) / 120
+    further = (51 + 75 * t - 210 * t**2 + 150 * t**3 - 45 * t**4 + 5 * t**5) / 120
+    return np.where(t < 1, near, np.where(t < 2, further, np.maximum(3 - t, 0.0) ** 5 / 120))
+
+
+def _weighted(
+    patches: Float[np.ndarray, "windows rows cols"],
+    taps: Float[np.ndarray, "windows 6"],
+    axis: int,
+    size: int,
+) -> Float[np.ndarray, "windows _ _"]:
+    """Sums of `size` neighbours along an axis, with each window's own weights."""
+    along = np.moveaxis(patches, axis, 1)
+    weights = taps.astype(patches.dtype)[..., None, None]
+    total = weights[:, 0] * along[:, :size]
+    for n in range(1, taps.shape[1]):
+        total += weights[:, n] * along[:, n : n + size]
+    return np.moveaxis(total, 1, axis)
 
 
 def _put(old: np.ndarray, new: np.ndarray, where: Bool[np.ndarray, " windows"]) -> np.ndarray:

@@ -21,7 +21,6 @@ from app.reconstruct.yardstick import (
     read_motion,
     trusted,
 )
-from core.displacement import measure_shift
 from core.drift import Similarity
 from core.motion import CameraMotion
 from core.problem import ShiftMeasurement
@@ -114,7 +113,7 @@ def without_known_drift(
     if known and read.is_rigid:
         return _known(exposures, read, said, "the border")
     if prior.std_px == 0.0:
-        shift = measure_shift(exposures.before, exposures.after, exposures.variance, exposures.window_px)
+        shift = exposures.as_they_are.measured(follow=True)
         return shift, Similarity(), f"{said}The camera is stated to stand still between the exposures."
     shift, drift = aligned(exposures, in_room)
     moved, expected = (

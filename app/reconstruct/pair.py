@@ -82,6 +82,8 @@ def _moved_px(before: Image, after: Image) -> tuple[float, float]:
     before, after = _middle(before), _middle(after)
     found, _, _ = phase_cross_correlation(after, before)
     moved = np.asarray(found, float)
+    if not moved.any():
+        return 0.0, 0.0
     if _alike(shift(before, moved, order=0, mode="nearest"), after) <= _alike(before, after):
         return 0.0, 0.0
     return float(moved[1]), float(moved[0])

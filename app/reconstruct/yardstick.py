@@ -6,11 +6,12 @@ room's air before it, or moved itself: it is refused, by name.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
-from core.displacement import measure_shift
+from core.displacement import ShiftOfPair
 from core.drift import Similarity, fit_similarity, move_image
 from core.problem import ShiftMeasurement
 
@@ -24,6 +25,8 @@ _PASSES = 3
 _NOISE_FACTOR, _SIGMAS = 1.3, 4.0
 # Fewer windows than this say nothing of a rigid motion: in all, and in one of several parts.
 _LEAST_WINDOWS, _LEAST_IN_PART = 12, 4
+# A window that knows its shift no better than to a pixel shows nothing: a bare wall is of such windows.
+_SEEN_PER_PX2 = 1.0
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,15 @@ class Exposures:
     def size_px(self) -> tuple[int, int]:
         """Width and height."""
         return self.before.shape[1], self.before.shape[0]
+
+    @cached_property
+    def as_they_are(self) -> ShiftOfPair:
+        """Both pictures, before any motion is taken out."""
+        return ShiftOfPair(self.before, self.after, self.variance, self.window_px)
+
+    def moved(self, drift: Similarity) -> ShiftOfPair:
+        """Both pictures, with the first as it looks after a motion of the camera."""
+        return ShiftOfPair(move_image(self.before, drift), self.after, self.variance, self.window_px)
 
 
 @dataclass(frozen=True)
@@ -77,8 +89,12 @@ class Rigid:
 
 def read_motion(exposures: Exposures, windows: Mask) -> Rigid:
     """The motion of the camera as these windows tell it, if they are still."""
+    shape, first = exposures.before.shape, exposures.as_they_are.measured(follow=False)
+    seen = np.trace(first.information_per_px2, axis1=1, axis2=2) > _SEEN_PER_PX2
+    if (good_windows(first, windows) & seen).sum() < _LEAST_IN_PART:
+        return Rigid(first, Similarity(), np.full((4, 4), np.inf), 0.0, 0)
     shift, drift = aligned(exposures, windows)
-    shape, good = exposures.before.shape, good_windows(shift, windows)
+    good = good_windows(shift, windows)
     rest, covariance = fit_similarity(shift, good, shape)
     left_px = shift.displacement_px - rest.displacement_px(shift.centres_px, shape)
     unlike, root_px = _mean_square(shift, left_px, good), _root_px(covariance, exposures.size_px)
@@ -114,15 +130,15 @@ class Trusted:
 
 def aligned(exposures: Exposures, yardstick: Mask) -> tuple[ShiftMeasurement, Similarity]:
     """The shifts that are left when the reference is moved as the yardstick moved, and that motion."""
-    moved, drift, shape = exposures.before, Similarity(), exposures.before.shape
+    pictures, drift, shape = exposures.as_they_are, Similarity(), exposures.before.shape
     for _ in range(_PASSES if yardstick.sum() >= _LEAST_WINDOWS else 0):
-        shift = measure_shift(moved, exposures.after, exposures.variance, exposures.window_px, follow=False)
+        shift = pictures.measured(follow=False)
         rest, _ = fit_similarity(shift, good_windows(shift, yardstick), shape)
         if max(abs(rest.column_px), abs(rest.row_px)) < _SMALL_DRIFT_PX:
             break
         drift = rest.after(drift)
-        moved = move_image(exposures.before, drift)
-    return measure_shift(moved, exposures.after, exposures.variance, exposures.window_px), drift
+        pictures = exposures.moved(drift)
+    return pictures.measured(follow=True), drift
 
 
 def good_windows(shift: ShiftMeasurement, chosen: Mask) -> Mask:

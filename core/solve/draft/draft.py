@@ -7,12 +7,14 @@ from jaxtyping import Array, Float
 
 from core.data_error import WALL_MARGIN
 from core.known_temperature import VertexGrid
+from core.motion import WithoutMotion
 from core.problem import Problem
 from core.rays.operator import StraightRayOperator, build
 from core.rays.visibility import away_from_walls
 from core.result import Solution
 from core.scene import Scene
 from core.solve.check import check_problem
+from core.solve.draft.conjugate_gradients import Product
 from core.solve.draft.temperature import solve_temperature
 from core.solve.draft.temperature_prior import TemperatureSettings
 from core.view_frame import looked_along
@@ -20,6 +22,19 @@ from core.watch import Watch
 
 _apply = jax.jit(lambda operator, values: operator.apply(values))
 _transpose = jax.jit(lambda operator, shift: operator.transpose(shift))
+
+
+@jax.jit
+def _normal(
+    operator: StraightRayOperator, weight: Array, still: WithoutMotion | None, values: Array
+) -> Array:
+    shift = operator.apply(values)
+    if still is not None:
+        shift = shift - still.out @ jnp.einsum("wap,wa->p", still.along, shift)
+    shift = jnp.einsum("wab,wb->wa", weight, shift)
+    if still is not None:
+        shift = shift - still.along @ jnp.einsum("wap,wa->p", still.out, shift)
+    return operator.transpose(shift)
 
 
 class _OnTheDevice:
@@ -39,6 +54,17 @@ class _OnTheDevice:
     def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Float[np.ndarray, "nx ny nz"]:
         with jax.enable_x64(True):
             return np.asarray(_transpose(self._operator, jnp.asarray(displacement_px, jnp.float64)))
+
+    def normal(self, weight: Float[np.ndarray, "windows 2 2"], still: WithoutMotion | None = None) -> Product:
+        """One program for all three products: an iteration waits for it once."""
+        with jax.enable_x64(True):
+            fixed = (self._operator, jnp.asarray(weight), jax.tree.map(jnp.asarray, still))
+
+        def product(values: Float[np.ndarray, "nx ny nz"]) -> Float[np.ndarray, "nx ny nz"]:
+            with jax.enable_x64(True):
+                return np.asarray(_normal(*fixed, jnp.asarray(values, jnp.float64)))
+
+        return product
 
 
 def _widened(leaf: Array) -> Array:

@@ -20,7 +20,6 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, cg
 
 from core.air import Air
 from core.drift import nearly_still
@@ -30,6 +29,7 @@ from core.problem import Problem, ShiftMeasurement
 from core.result import Outcome, Solution
 from core.scene import ProjectedPattern
 from core.setting import SettingError
+from core.solve.draft.conjugate_gradients import Product, conjugate_gradients
 from core.solve.draft.front_layers import front_layers_px
 from core.solve.draft.temperature_deviation import deviation
 from core.solve.draft.temperature_prior import (
@@ -47,7 +47,6 @@ from core.solve.draft.temperature_system import (
     ShiftOperator,
     System,
     Volume,
-    linear_operator,
     preconditioner,
     steepest_slopes,
     without_shared_errors,
@@ -174,7 +173,7 @@ def _paths(problem: Problem) -> float:
 
 def _minimise(
     system: System,
-    inverse: LinearOperator,
+    inverse: Product,
     shifts: tuple[ShiftMeasurement, ...],
     prior: Volume,
     air: Air,
@@ -186,11 +185,11 @@ def _minimise(
     history: list[Row] = []
     x, y, z = system.grid.axes_m
 
-    def record(flat: np.ndarray) -> None:
-        change_k, elapsed_s = float(np.abs(flat).max() / system.per_k), time.perf_counter() - began_s
+    def record(change: Volume) -> None:
+        change_k, elapsed_s = float(np.abs(change).max() / system.per_k), time.perf_counter() - began_s
         row = {"doing": "fit the temperature", "iteration": len(history) + 1.0, "change": change_k}
         history.append({**row, "elapsed_s": elapsed_s})
-        n = prior + flat.reshape(system.grid.shape)
+        n = prior + change
         watch.tell(history[-1], lambda: Solution(x, y, z, _kelvin(air, n), outcome=Outcome.step_limit))
 
     rhs = _right_hand_side(system, shifts, prior, air)
@@ -201,7 +200,7 @@ def _minimise(
 def _right_hand_side(system: System, shifts: tuple[ShiftMeasurement, ...], prior: Volume, air: Air) -> Volume:
     """Minus the gradient at the prior."""
     known, ambient = system.known, air.ambient_temperature_k
-    rhs = -system.data_terms(prior) - system.known_terms(prior)
+    rhs = -system.data_product()(prior) - system.known_terms(prior)
     for operator, weight, shift in zip(system.operators, system.weights, shifts, strict=True):
         rhs += operator.transpose(np.einsum("wab,wb->wa", weight, shift.displacement_px))
     target = excess(air, np.where(known.mask, known.temperature_k, ambient) - ambient)
@@ -214,26 +213,18 @@ def _right_hand_side(system: System, shifts: tuple[ShiftMeasurement, ...], prior
 
 def _solved(
     system: System,
-    inverse: LinearOperator,
+    inverse: Product,
     rhs: Volume,
     tolerance: float,
     settings: TemperatureSettings,
     watch: Watch,
-    record: Callable[[np.ndarray], None] | None = None,
+    record: Callable[[Volume], object] = lambda found: None,
 ) -> tuple[Volume, bool]:
     """The Hessian's inverse times `rhs`, and whether it was reached. Raises StoppedError between two products."""
+    data_terms = system.data_product()
 
-    def hessian(flat: np.ndarray) -> np.ndarray:
+    def hessian(n: Volume) -> Volume:
         watch.check_stop()
-        n = flat.reshape(rhs.shape)
-        return (system.data_terms(n) + system.known_terms(n) + system.smooth(n)).ravel()
+        return data_terms(n) + system.known_terms(n) + system.smooth(n)
 
-    found, info = cg(
-        linear_operator(hessian, rhs.size),
-        rhs.ravel(),
-        rtol=tolerance,
-        maxiter=settings.max_iterations,
-        M=inverse,
-        callback=record,
-    )
-    return found.reshape(rhs.shape), info == 0
+    return conjugate_gradients(hessian, inverse, rhs, tolerance, settings.max_iterations, record)

@@ -4,19 +4,18 @@ Conjugate gradients cost two operator products an iteration; the preconditioner 
 mean data term, which are diagonal under the cosine transform.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
-from scipy.sparse.linalg import LinearOperator
 
 from core.geometry import face_of
 from core.known_temperature import KnownTemperature, VertexGrid
 from core.motion import WithoutMotion, without_motion
 from core.problem import ShiftMeasurement
 from core.scene import Scene
+from core.solve.draft.conjugate_gradients import Product
 from core.view_frame import facing, looked_along, turn_to
 
 Volume = Float[np.ndarray, "nx ny nz"]
@@ -34,6 +33,10 @@ class ShiftOperator(Protocol):
 
     def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Volume:
         """The transposed map."""
+        ...
+
+    def normal(self, weight: Float[np.ndarray, "windows 2 2"], still: WithoutMotion | None = None) -> Product:
+        """The map, weights, and the map transposed, as one; `still` takes shared errors out between them."""
         ...
 
 
@@ -82,12 +85,12 @@ class System:
             flat[members] += n.reshape(-1)[members].mean() / (len(members) * (std * self.per_k) ** 2)
         return total
 
-    def data_terms(self, n: Volume) -> Volume:
-        """Hessian of the data, times n."""
-        total = np.zeros_like(n)
-        for operator, weight in zip(self.operators, self.weights, strict=True):
-            total += operator.transpose(np.einsum("wab,wb->wa", weight, operator.apply(n)))
-        return total
+    def data_product(self) -> Product:
+        """What multiplies n with the Hessian of the data."""
+        parts = [
+            operator.normal(weight) for operator, weight in zip(self.operators, self.weights, strict=True)
+        ]
+        return lambda n: sum((part(n) for part in parts), np.zeros_like(n))
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,12 @@ class StillOperator:
     def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Volume:
         """The transposed map."""
         return self.rays.transpose(self.still.transpose(displacement_px))
+
+    def normal(self, weight: Float[np.ndarray, "windows 2 2"], still: WithoutMotion | None = None) -> Product:
+        """The map, weights, and the map transposed, as one. Nothing else can be taken out of it: `still` is None."""
+        if still is not None:
+            raise ValueError("A StillOperator has taken its shared errors out; expected none to be named.")
+        return self.rays.normal(weight, self.still)
 
 
 def without_shared_errors(
@@ -125,7 +134,7 @@ def without_shared_errors(
     return StillOperator(operator, still), replace(shift, displacement_px=still.apply(shift.displacement_px))
 
 
-def preconditioner(system: System) -> LinearOperator:
+def preconditioner(system: System) -> Product:
     """Inverse of a separable stand-in: eigenvectors along x and z, a dense system along y.
 
     The stand-in of views along y is data = (Lx / hx^2 + Lz / hz^2) (x) W, with the levers W of the slabs measured on
@@ -157,13 +166,15 @@ def preconditioner(system: System) -> LinearOperator:
         matrices[0] += weights[:, None, None] * np.full((shape[1], shape[1]), 1 / shape[1])
     inverses = np.linalg.inv(matrices)
 
-    def apply(flat: np.ndarray) -> np.ndarray:
-        modes = np.einsum("xi,xyz,zk->iky", qx, flat.reshape(shape), qz, optimize=True)
-        modes = (inverses @ modes[..., None])[..., 0]
-        return np.einsum("xi,iky,zk->xyz", qx, modes, qz, optimize=True).ravel()
+    across_x, across_z = np.ascontiguousarray(qx.T), np.ascontiguousarray(qz.T)
 
-    size = int(np.prod(shape))
-    return linear_operator(apply, size)
+    def apply(n: Volume) -> Volume:
+        # Slab by slab: products so small stay in this thread.
+        modes = (across_x @ n.transpose(1, 0, 2) @ qz).transpose(1, 2, 0)
+        modes = (inverses @ modes[..., None])[..., 0]
+        return np.ascontiguousarray((qx @ modes.transpose(2, 0, 1) @ across_z).transpose(1, 0, 2))
+
+    return apply
 
 
 def _second_differences(n: Volume, axis: int) -> Volume:
@@ -233,11 +244,6 @@ def _laplacian(n: int) -> Float[np.ndarray, "n n"]:
     laplacian = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
     laplacian[0, 0] = laplacian[-1, -1] = 1.0
     return laplacian
-
-
-def linear_operator(product: Callable[[np.ndarray], np.ndarray], size: int) -> LinearOperator:
-    """A symmetric product of flat vectors, for SciPy."""
-    return LinearOperator((size, size), matvec=product, dtype=np.float64)  # type: ignore[call-arg]
 
 
 def _modes(
