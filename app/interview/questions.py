@@ -1,4 +1,4 @@
-"""What `airlens new` asks, in the order of the page: devices, room, wall, place.
+"""What `airlens new` asks, in the order of the page: devices, room, wall, place, further cameras.
 
 The answers begin as a template's, so that each question has a default, and each answer replaces one of them.
 """
@@ -10,10 +10,11 @@ from functools import cache
 
 from app.errors import BadInputError
 from app.files.toml import parse, toml_data
-from app.interview.ask import NOTHING, Asked, ask_choice, ask_either, ask_field, ask_number
+from app.interview.ask import NOTHING, Asked, ask_choice, ask_field, ask_number
 from app.interview.conversation import Flow, Question, Remark
 from app.interview.room import ask_room
 from app.interview.tree import Tree, put, value_at
+from app.interview.views import PROJECTOR, ask_lens, ask_views
 from app.rig.inventory import CameraChoice, found_cameras
 from app.rig.ports import FoundPort, FoundProjector, found_ports, who_is_there
 from app.setup.answers import Answers
@@ -21,12 +22,6 @@ from app.setup.experiment import ANSWERS_FILE, SAMPLE, TEMPLATES, corner_of, roo
 from app.setup.scene import picture_told, settings_of
 
 ROOMS = tuple(name for name in TEMPLATES if name != SAMPLE)
-_PROJECTOR: Tree = {
-    "position": ["1 m", "-1 m", "1.3 m"],
-    "width_px": 1920,
-    "height_px": 1200,
-    "angle_of_view": "40 deg",
-}
 
 
 @dataclass(frozen=True)
@@ -48,6 +43,7 @@ def questions(inventory: Inventory) -> Flow:
     yield from ask_room(tree)
     yield from _ask_wall(tree, inventory)
     yield from _ask_place(tree)
+    yield from ask_views(tree)
     return tree
 
 
@@ -107,7 +103,7 @@ def _ask_wall(tree: Tree, inventory: Inventory) -> Asked:
     if (yield from ask_choice("Pattern on the wall", words, default, told)) == "print":
         tree.pop("projector", None)
         return
-    tree.setdefault("projector", copy.deepcopy(_PROJECTOR))
+    tree.setdefault("projector", copy.deepcopy(PROJECTOR))
     for axis in range(3):
         yield from ask_field(tree, ("projector", "position", axis), f"Projector's lens, {'xyz'[axis]}", "m")
     yield from ask_field(tree, ("projector", "angle_of_view"), "Projector's angle of view across", "deg")
@@ -135,15 +131,7 @@ def _ask_address(tree: Tree, inventory: Inventory) -> Asked:
 
 
 def _ask_place(tree: Tree) -> Asked:
-    ways = (("angle_of_view", "deg"), ("focal_length", "mm"))
-    lens = yield from ask_either(
-        tree, ("camera",), "Lens: angle of view across (59 deg) or focal length (10 mm)", ways
-    )
-    if lens == "focal_length":
-        tree["camera"].setdefault("pixel_pitch", "5.86 um")
-        yield from ask_field(tree, ("camera", "pixel_pitch"), "Pixel pitch", "um")
-    else:
-        tree["camera"].pop("pixel_pitch", None)
+    yield from ask_lens(tree, ("camera",), "Lens: angle of view across (59 deg) or focal length (10 mm)")
     yield from ask_number(tree, ("camera", "width_px"), "Columns of the picture [px]")
     yield from ask_number(tree, ("camera", "height_px"), "Rows of the picture [px]")
     if value_at(tree, ("camera", "position")) is not None:

@@ -73,7 +73,7 @@ def _ask_things(tree: Tree, kind: str) -> Asked:
     more = [copy.deepcopy(_FRESH[kind]) for _ in range(count - len(there))]
     tree[kind] = [*there[:count], *more]
     for number in range(count):
-        asked = yield from _counting(_ASK[kind](tree, kind, (kind, number), f"{kind} {number + 1}"))
+        asked = yield from counting(_ASK[kind](tree, kind, (kind, number), f"{kind} {number + 1}"))
         wrong = sentence_at(tree, (kind, number))
         if wrong:
             yield Again(wrong, asked)
@@ -81,7 +81,7 @@ def _ask_things(tree: Tree, kind: str) -> Asked:
         del tree[kind]
 
 
-def _counting(asking: Asked) -> Asked:
+def counting(asking: Asked) -> Asked:
     """Ask the same; return how many questions that were."""
     asked, answer = 0, None
     try:

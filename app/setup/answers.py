@@ -5,7 +5,7 @@ camera to the patterned wall, z upwards. An opening is a rectangle on a wall: `l
 corners along the wall's two axes, in the order x, y, z.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -31,12 +31,11 @@ MANY = 100
 Pixels = Annotated[int, Field(ge=16, le=20_000)]
 
 
-class CameraAnswer(Strict):
-    """The camera, its lens, and where it stands: `distance` from the patterned wall, else `position`.
+class EyeAnswer(Strict):
+    """A camera and its lens: where it stands is told as `distance` from its wall, else as `position`.
 
     The lens is known by its angle of view across the picture, or by focal length and pixel pitch. It is what
-    calibration starts from. A simulated camera looks at the room of `truth`: an NPZ file, or the
-    packaged room, `sample`.
+    calibration starts from.
     """
 
     kind: Literal["v4l2", "aravis", "simulated"]
@@ -65,16 +64,30 @@ class CameraAnswer(Strict):
     """From the patterned wall, straight at its middle; or give `position`."""
     position: tuple[Length, Length, Length] | None = None
     """The lens, from the room's corner: x, y, z."""
-    truth: str = ""
-    """For a simulated camera: the room that it looks at (NPZ), or `sample`."""
 
     @model_validator(mode="after")
-    def _one_way(self) -> "CameraAnswer":
+    def _one_lens_and_place(self) -> Self:
         lens = self.focal_length is not None and self.pixel_pitch is not None
         if lens == (self.angle_of_view is not None):
             raise ValueError("give angle_of_view, or focal_length and pixel_pitch, and not both")
         if (self.distance is None) == (self.position is None):
             raise ValueError("give distance (to the patterned wall) or position, and not both")
+        return self
+
+
+class CameraAnswer(EyeAnswer):
+    """The camera, which looks at y_max, its lens, and where it stands: `distance` from its wall, else `position`.
+
+    The lens is known by its angle of view across the picture, or by focal length and pixel pitch. It is what
+    calibration starts from. A simulated camera looks at the room of `truth`: an NPZ file, or the
+    packaged room, `sample`.
+    """
+
+    truth: str = ""
+    """For a simulated camera: the room that it looks at (NPZ), or `sample`."""
+
+    @model_validator(mode="after")
+    def _a_room_to_look_at(self) -> Self:
         if (self.kind == "simulated") != bool(self.truth):
             raise ValueError("give truth, the room that it looks at, for a simulated camera, and only there")
         return self
@@ -93,6 +106,22 @@ class ProjectorAnswer(Strict):
     """Across the picture."""
     url: str = ""
     """Its address, where it can be spoken to."""
+
+
+class ViewAnswer(EyeAnswer):
+    """A further camera: the wall that it looks at, and what patterns that wall. Of a simulated rig all are simulated.
+
+    Cameras of one wall share its pattern: the first one of them tells it, and for y_max the first camera of all.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=60)]
+    """What it is called, in captures and calibrations."""
+    wall: WallName
+    """The wall that it looks at."""
+    projector: ProjectorAnswer | None = None
+    """A projector instead of a print on its wall."""
+    pattern_seed: int = 0
+    """Which of all random patterns is on its wall."""
 
 
 class OpeningAnswer(Strict):
@@ -233,6 +262,8 @@ class Answers(Strict):
     """A projector instead of a print."""
     pattern_seed: int = 0
     """Which of all random patterns."""
+    view: tuple[ViewAnswer, ...] = Field(default=(), max_length=MANY)
+    """Further cameras, each before its wall."""
     supply: tuple[SupplyAnswer, ...] = Field(default=(), max_length=MANY)
     """Where air is blown in."""
     outlet: tuple[OutletAnswer, ...] = Field(default=(), max_length=MANY)

@@ -11,6 +11,7 @@ from typing import Any, TypeVar, cast
 from pydantic import BaseModel
 
 from app.experiment.folder import ExperimentSettings
+from app.experiment.rig_settings import RigSettings
 from app.setup.answers import Answers
 from app.setup.readback import blows_in
 from core.objects import RoomObject
@@ -38,17 +39,14 @@ def changed_settings(
             name: merged(*(getattr(one.scene, name) for one in (old, before, after)))
             for name in ("room", "air", "light")
         },
-        views=tuple(
-            merged(one, before.scene.views[0], after.scene.views[0]) if one is view else one
-            for one in old.scene.views
-        ),
+        views=_views(old.scene, view, told, (before.scene, after.scene)),
         boundary=_boundary(old.scene, told, (before.scene, after.scene), listed),
         objects=_objects(old.scene, told, (before.scene, after.scene)),
     )
     return old.model_copy(
         update={
             "title": merged(old.title, before.title, after.title),
-            "rig": merged(old.rig, before.rig, after.rig),
+            "rig": _rig(old.rig, told, (before.rig, after.rig)),
             "scene": scene,
         }
     )
@@ -94,6 +92,33 @@ def _list(olds: Sequence[T], source: dict[int, int], before: Sequence[T], after:
         cast(T, merged(olds[source[n]], before[source[n]], item)) if n in source else item
         for n, item in enumerate(after)
     ]
+
+
+def _views(
+    old: Scene, asked: View, told: tuple[Answers, Answers], made: tuple[Scene, Scene]
+) -> tuple[View, ...]:
+    """The view that `camera` answers, and the others as answers tell them: these where it is the first."""
+    first = merged(asked, made[0].views[0], made[1].views[0])
+    if asked is not old.views[0]:
+        return tuple(first if one is asked else one for one in old.views)
+    source = _sources(told[0].view, told[1].view)
+    return (first, *_list(old.views[1:], source, made[0].views[1:], made[1].views[1:]))
+
+
+def _rig(
+    old: RigSettings, told: tuple[Answers, Answers], made: tuple[RigSettings, RigSettings]
+) -> RigSettings:
+    """The devices; a further camera keeps its own whatever it is called now."""
+    source = _sources(told[0].view, told[1].view)
+    kept, before, after = (dict(one.cameras or {}) for one in (old, *made))
+    names = [view.name for view in told[0].view]
+    cameras = {name: device for name, device in kept.items() if name not in names}
+    for number, view in enumerate(told[1].view):
+        was = names[source[number]] if number in source else ""
+        device = merged(kept.get(was), before.get(was), after.get(view.name))
+        if device is not None:
+            cameras[view.name] = device
+    return merged(old, *made).model_copy(update={"cameras": cameras or None})
 
 
 def _boundary(

@@ -108,13 +108,19 @@ def change_answers(experiment: Experiment, data: dict[str, Any]) -> Experiment:
         raise BadInputError(
             "camera.truth: the room that a simulated camera looks at cannot be changed. Make a new experiment."
         )
+    view = asked_view(experiment.settings.scene)
+    if after.view and view is not experiment.settings.scene.views[0]:
+        raise BadInputError(
+            f"view: {view.name!r}, which looks at y_max, is not the first camera of experiment.toml. Put it first, "
+            "or change further cameras there."
+        )
     listed = listed_tables(experiment)
     try:
         settings = changed_settings(
             experiment.settings,
             (before, after),
             (described(before, corner_m), described(after, corner_m)),
-            asked_view(experiment.settings.scene),
+            view,
             listed,
         )
     except SettingError as error:

@@ -23,9 +23,11 @@ from app.setup.answers import (
     SupplyAnswer,
     SurfaceAnswer,
     ThermometerAnswer,
+    ViewAnswer,
     WallAnswer,
 )
 from app.setup.units import Size
+from app.setup.view_mistakes import view_mistakes
 from core.geometry import Box, Vector3, face_of
 from core.objects import RoomObject, ready_object, shared_m
 from core.scene import Patch, stands_before
@@ -38,6 +40,7 @@ _ONES: dict[str, Any] = {
     "projector": ProjectorAnswer,
 }
 _LISTS: dict[str, Any] = {
+    "view": ViewAnswer,
     "supply": SupplyAnswer,
     "outlet": OutletAnswer,
     "surface": SurfaceAnswer,
@@ -102,6 +105,7 @@ def _contradictions(parts: Parts) -> list[Said]:
         _objects_apart,
         _objects_before_openings,
         _wall_twice,
+        view_mistakes,
     )
     return [said for check in checks for said in check(parts)]
 

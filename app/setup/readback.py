@@ -4,7 +4,7 @@ What is told in `unsaid` stays in the scene as it is when answers change (`app/s
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,10 @@ import numpy as np
 from app.errors import BadInputError
 from app.experiment.boundary import read_sensor_table
 from app.experiment.folder import Experiment, ExperimentSettings
-from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.setup.answers import MANY
-from core.geometry import Optics, Vector3, face_of
+from app.setup.eye_readback import camera_answer, projector_answer, view_answers
+from app.setup.written import Told, celsius, metres
+from core.geometry import Vector3, face_of
 from core.objects import RoomObject
 from core.problem import SensorData
 from core.scene import (
@@ -31,7 +32,6 @@ from core.scene import (
     Wall,
 )
 
-_KELVIN = 273.15
 _LEAST_STD = 1e-3
 
 
@@ -43,17 +43,6 @@ class ReadBack:
     unsaid: tuple[str, ...]
 
 
-@dataclass
-class _Told:
-    """What is being read: the room's corner, and what has been found that no answer says."""
-
-    corner_m: Vector3
-    unsaid: list[str] = field(default_factory=list)
-
-    def place(self, at_m: Vector3) -> list[str]:
-        return [metres(value - corner) for value, corner in zip(at_m, self.corner_m, strict=True)]
-
-
 def read_back(experiment: Experiment) -> ReadBack:
     """The experiment's scene and rig as answers. Raises BadInputError where no camera looks at y_max."""
     found = scene_back(experiment.settings)
@@ -63,21 +52,27 @@ def read_back(experiment: Experiment) -> ReadBack:
 
 def scene_back(settings: ExperimentSettings) -> ReadBack:
     """The same of settings alone, without what files of sensors hold."""
-    told = _Told(settings.scene.room.lower_m)
+    told = Told(settings.scene.room.lower_m)
     view = asked_view(settings.scene)
     answers: dict[str, Any] = {
         "title": settings.title,
         "room": [metres(value) for value in settings.scene.room.size_m],
         "air": celsius(settings.scene.air.ambient_temperature_k),
-        "camera": _camera(settings, view, told),
+        "camera": camera_answer(settings, view, told),
     }
     if not isinstance(settings.scene.light.pattern, CheckerPattern):
         answers["pattern_seed"] = settings.scene.light.pattern.seed
     if isinstance(settings.scene.light, ProjectedPattern):
-        answers["projector"] = _projector(settings.rig, settings.scene.light.projector, told)
+        spoken = settings.rig.projector
+        url = spoken.url if spoken else ""
+        answers["projector"] = projector_answer(settings.scene.light.projector, url, told)
     answers |= _boundary(settings.scene, told)
     answers["object"] = [_object(item, told) for item in settings.scene.objects]
-    _other_views(settings.scene, view, told)
+    if view is settings.scene.views[0]:
+        answers["view"] = view_answers(settings, told)
+    else:
+        others = [one.name for one in settings.scene.views if one is not view]
+        told.unsaid.append(f"Further cameras: {', '.join(others)}.")
     return ReadBack({name: value for name, value in answers.items() if value != []}, tuple(told.unsaid))
 
 
@@ -99,7 +94,7 @@ def listed_tables(experiment: Experiment) -> frozenset[str]:
 
 def answer_of(box: RoomObject, corner_m: Vector3) -> dict[str, Any]:
     """An object as an answer, its place measured from the room's corner."""
-    return _object(box, _Told(corner_m))
+    return _object(box, Told(corner_m))
 
 
 def blows_in(inlet: Inlet) -> float:
@@ -108,70 +103,11 @@ def blows_in(inlet: Inlet) -> float:
     return face.inward * inlet.velocity_m_s[face.axis]
 
 
-def metres(value_m: float) -> str:
-    """A length as it is written; to the micrometre, which is less than a tape measure's own digits."""
-    return f"{_plain(value_m, 6)} m"
-
-
-def celsius(value_k: float) -> str:
-    """A temperature as it is written; in kelvin where C would look like kelvin."""
-    value = value_k - _KELVIN
-    return f"{_plain(value_k, 6)} K" if 250 <= value <= 330 else f"{_plain(value, 6)} C"
-
-
-def _plain(value: float, digits: int) -> str:
-    return f"{round(value, digits) + 0.0:.12g}"
-
-
 def _kelvin(value_k: float) -> str:
     return f"{max(value_k, _LEAST_STD):.9g} K"
 
 
-def _camera(settings: ExperimentSettings, view: View, told: _Told) -> dict[str, Any]:
-    optics, device = view.camera, settings.rig.camera
-    if any(optics.rotation_rad) and not _is_straight(optics):
-        told.unsaid.append("The camera is turned: its direction stays as it is when its place changes.")
-    answer: dict[str, Any] = {
-        "kind": "v4l2" if device is None else device.kind,
-        "width_px": optics.width_px,
-        "height_px": optics.height_px,
-        "bits": view.noise.bits,
-        "frames": view.frames,
-        "angle_of_view": f"{_angle_deg(optics):.9g} deg",
-        "position": told.place(optics.position_m),
-    }
-    if device is None:
-        told.unsaid.append("No camera is named: pictures are imported.")
-    elif isinstance(device, SimulatedCameraSettings):
-        answer["truth"] = device.room
-        answer["exposure"] = f"{1000 * device.exposure_s:.9g} ms"
-    else:
-        answer |= {"device": device.device, "pixel_format": device.pixel_format}
-        if device.exposure_s is not None:
-            answer["exposure"] = f"{1000 * device.exposure_s:.9g} ms"
-    return answer
-
-
-def _is_straight(optics: Optics) -> bool:
-    """Whether it looks along y, upright."""
-    return bool(np.allclose(optics.rotation @ np.array([0.0, 1.0, 0.0]), [0.0, 0.0, 1.0], atol=1e-6))
-
-
-def _angle_deg(optics: Optics) -> float:
-    return math.degrees(2 * math.atan(optics.width_px / (2 * optics.focal_px[0])))
-
-
-def _projector(rig: RigSettings, optics: Optics, told: _Told) -> dict[str, Any]:
-    return {
-        "position": told.place(optics.position_m),
-        "width_px": optics.width_px,
-        "height_px": optics.height_px,
-        "angle_of_view": f"{_angle_deg(optics):.9g} deg",
-        "url": rig.projector.url if rig.projector else "",
-    }
-
-
-def _boundary(scene: Scene, told: _Told) -> dict[str, list[dict[str, Any]]]:
+def _boundary(scene: Scene, told: Told) -> dict[str, list[dict[str, Any]]]:
     found: dict[str, list[dict[str, Any]]] = {"supply": [], "outlet": [], "surface": [], "wall": []}
     for part in scene.boundary:
         match part:
@@ -192,7 +128,7 @@ def _boundary(scene: Scene, told: _Told) -> dict[str, list[dict[str, Any]]]:
     return found
 
 
-def _supply(inlet: Inlet, number: int, told: _Told) -> dict[str, Any]:
+def _supply(inlet: Inlet, number: int, told: Told) -> dict[str, Any]:
     speed_m_s = blows_in(inlet)
     if abs(speed_m_s - math.hypot(*inlet.velocity_m_s)) > 1e-6 * speed_m_s:
         told.unsaid.append(
@@ -208,7 +144,7 @@ def _supply(inlet: Inlet, number: int, told: _Told) -> dict[str, Any]:
     }
 
 
-def _opening(patch: Patch, told: _Told) -> dict[str, Any]:
+def _opening(patch: Patch, told: Told) -> dict[str, Any]:
     corner = [told.corner_m[axis] for axis in face_of(patch.wall).along]
     return {
         "wall": patch.wall,
@@ -223,7 +159,7 @@ def _reading(part: Inlet | Outlet | Heater | Wall | RoomObject, value_k: float |
     return {"temperature": celsius(value_k), "temperature_deviation": _kelvin(part.temperature_std_k)}
 
 
-def _wall(wall: Wall, told: _Told) -> list[dict[str, Any]]:
+def _wall(wall: Wall, told: Told) -> list[dict[str, Any]]:
     if not wall.no_slip:
         told.unsaid.append(f"Air does not stick to the wall {wall.wall}.")
     if wall.thermal == "unknown":
@@ -232,7 +168,7 @@ def _wall(wall: Wall, told: _Told) -> list[dict[str, Any]]:
     return [{"wall": wall.wall} | known]
 
 
-def _object(item: RoomObject, told: _Told) -> dict[str, Any]:
+def _object(item: RoomObject, told: Told) -> dict[str, Any]:
     middle_m = tuple(0.5 * (low + high) for low, high in zip(item.lower_m, item.upper_m, strict=True))
     answer: dict[str, Any] = {
         "kind": "box",
@@ -256,7 +192,7 @@ def _is_short(table: SensorData) -> bool:
 
 
 def _sensors(experiment: Experiment) -> tuple[dict[str, Any], tuple[str, ...]]:
-    told = _Told(experiment.settings.scene.room.lower_m)
+    told = Told(experiment.settings.scene.room.lower_m)
     found: dict[str, list[dict[str, Any]]] = {"thermometer": [], "anemometer": []}
     for file, table in _tables(experiment).items():
         if not _is_short(table):
@@ -286,9 +222,3 @@ def _sensors(experiment: Experiment) -> tuple[dict[str, Any], tuple[str, ...]]:
                     place | {"velocity": parts, "deviation": f"{float(std_m_s):.9g} m/s"}
                 )
     return {name: items for name, items in found.items() if items}, tuple(told.unsaid)
-
-
-def _other_views(scene: Scene, view: View, told: _Told) -> None:
-    others = [one.name for one in scene.views if one is not view]
-    if others:
-        told.unsaid.append(f"Further cameras: {', '.join(others)}.")

@@ -93,6 +93,17 @@ width_px = 1920
 height_px = 1200
 angle_of_view = "40 deg"
 url = "pjlink://192.168.0.20"
+[[view]]
+name = "right"
+wall = "x_max"
+kind = "v4l2"
+device = "/dev/video2"
+width_px = 1920
+height_px = 1200
+distance = "4 m"
+pattern_seed = 1
+[view.projector]
+width_px = 1920
 [[supply]]
 speed = "0.28 m/s"
 [[wall]]

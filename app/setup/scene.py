@@ -1,38 +1,28 @@
 """Answers to the scene and the rig that they describe. Raises BadInputError with the answer's name."""
 
-import math
 from dataclasses import replace
 
 from app.errors import BadInputError
-from app.experiment.folder import TRUTH_FILE, ExperimentSettings
-from app.experiment.rig_settings import (
-    AravisCameraSettings,
-    ProjectorSettings,
-    RigSettings,
-    SimulatedCameraSettings,
-    V4l2CameraSettings,
-)
-from app.setup.answers import Answers, CameraAnswer, ObjectAnswer, OpeningAnswer, SupplyAnswer
+from app.experiment.folder import ExperimentSettings
+from app.experiment.rig_settings import ProjectorSettings, RigSettings
+from app.setup.answers import Answers, ObjectAnswer, OpeningAnswer, SupplyAnswer
 from app.setup.mistakes import contradictions, field_name
-from app.volume.scene import projected
+from app.setup.views import device_of, devices_of, eye_of, further_views, light_of, moved, view_of
 from core.air import Air
-from core.geometry import WALLS, Box, Optics, Vector3, face_of, looking_along_y
+from core.geometry import WALLS, Box, Vector3, face_of
 from core.objects import RoomObject, ready_object
-from core.plan.print_choice import suited_print
 from core.scene import (
     BoundaryInformation,
-    CameraNoise,
     Heater,
     Inlet,
-    Light,
     Outlet,
     Patch,
     PointSensors,
     Scene,
-    View,
     Wall,
 )
 from core.setting import SettingError
+from core.view_frame import facing
 
 SENSORS_FILE = "boundary/sensors.csv"
 
@@ -50,18 +40,14 @@ def settings_of(answers: Answers, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> Experi
 
 def described(answers: Answers, corner_m: Vector3) -> ExperimentSettings:
     """The same of answers that may contradict one another: a scene that somebody wrote may. Raises BadInputError."""
-    room = Box(lower_m=corner_m, upper_m=_moved(answers.room, corner_m))
+    room = Box(lower_m=corner_m, upper_m=moved(answers.room, corner_m))
     try:
-        optics = _optics(answers.camera, room)
+        optics = eye_of(answers.camera, "y_max", room)
         scene = Scene(
             room=room,
             air=Air(ambient_temperature_k=answers.air),
-            views=(
-                View(
-                    camera=optics, noise=CameraNoise(bits=answers.camera.bits), frames=answers.camera.frames
-                ),
-            ),
-            light=_light(answers, optics, room),
+            views=(view_of(answers.camera, optics), *further_views(answers, room)),
+            light=light_of(answers.projector, answers.pattern_seed, optics, "y_max", room),
             boundary=tuple(_boundary(answers, room)),
             objects=tuple(object_of(item, n, room.lower_m) for n, item in enumerate(answers.object)),
         )
@@ -74,92 +60,45 @@ def described(answers: Answers, corner_m: Vector3) -> ExperimentSettings:
 def sensor_table(answers: Answers, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> str:
     """The thermometers and anemometers as the CSV that a scene names; empty where there are none."""
     rows = [
-        [*_moved(sensor.position, corner_m), sensor.temperature, sensor.temperature_deviation, "", "", "", ""]
+        [*moved(sensor.position, corner_m), sensor.temperature, sensor.temperature_deviation, "", "", "", ""]
         for sensor in answers.thermometer
     ]
     rows += [
-        [*_moved(meter.position, corner_m), "", "", *meter.velocity, meter.deviation]
+        [*moved(meter.position, corner_m), "", "", *meter.velocity, meter.deviation]
         for meter in answers.anemometer
     ]
     lines = [",".join(value if isinstance(value, str) else f"{value:.9g}" for value in row) for row in rows]
     return "\n".join(["x,y,z,T,T_std,u,v,w,u_std", *lines, ""]) if rows else ""
 
 
-def picture_on_wall_m(optics: Optics, room: Box) -> tuple[float, float]:
-    """Width and height of the wall that the camera sees."""
-    distance_m = room.upper_m[1] - optics.position_m[1]
-    return optics.width_px * distance_m / optics.focal_px[0], optics.height_px * distance_m / optics.focal_px[
-        1
-    ]
+def picture_on_wall_m(scene: Scene, view: int = 0) -> tuple[float, float]:
+    """Width and height of what a view's camera sees of its wall."""
+    framed, number = facing(scene, view)
+    eye, room = framed.views[number].camera, framed.room
+    distance_m = room.upper_m[1] - eye.position_m[1]
+    return eye.width_px * distance_m / eye.focal_px[0], eye.height_px * distance_m / eye.focal_px[1]
 
 
-def picture_told(scene: Scene) -> str:
-    """How much of the patterned wall the camera sees, as a sentence."""
-    width_m, height_m = picture_on_wall_m(scene.views[0].camera, scene.room)
-    return (
-        f"the camera sees {width_m:.2f} x {height_m:.2f} m of a wall of "
-        f"{scene.room.size_m[0]:g} x {scene.room.size_m[2]:g} m."
-    )
+def wall_m(scene: Scene, view: int = 0) -> tuple[float, float]:
+    """Width and height of the wall that a view looks at, as its camera sees it."""
+    framed, _ = facing(scene, view)
+    return framed.room.size_m[0], framed.room.size_m[2]
 
 
-def _optics(camera: CameraAnswer, room: Box) -> Optics:
-    """Straight at the patterned wall; from its middle where only the distance is told."""
-    back_m = room.upper_m[1]
-    if camera.position is None:
-        position = (room.centre_m[0], back_m - (camera.distance or 0.0), room.centre_m[2])
-    else:
-        position = _moved(camera.position, room.lower_m)
-    return _straight(position, camera.width_px, camera.height_px, _focal_px(camera))
-
-
-def _moved(place_m: Vector3, corner_m: Vector3) -> Vector3:
-    x, y, z = (value + corner for value, corner in zip(place_m, corner_m, strict=True))
-    return x, y, z
-
-
-def _straight(position_m: Vector3, width_px: int, height_px: int, focal_px: float) -> Optics:
-    return looking_along_y(position_m=position_m, width_px=width_px, height_px=height_px, focal_px=focal_px)
-
-
-def _focal_px(camera: CameraAnswer) -> float:
-    if camera.angle_of_view is not None:
-        return _focal_of_angle(camera.width_px, camera.angle_of_view)
-    return (camera.focal_length or 0.0) / (camera.pixel_pitch or 1.0)
-
-
-def _focal_of_angle(width_px: int, angle_deg: float) -> float:
-    return 0.5 * width_px / math.tan(math.radians(angle_deg) / 2)
-
-
-def _light(answers: Answers, camera: Optics, room: Box) -> Light:
-    thrown = answers.projector
-    if thrown is None:
-        return suited_print(camera, room.upper_m[1] - camera.position_m[1], answers.pattern_seed)
-    focal_px = _focal_of_angle(thrown.width_px, thrown.angle_of_view)
-    projector = _straight(_moved(thrown.position, room.lower_m), thrown.width_px, thrown.height_px, focal_px)
-    return projected(camera, projector, answers.pattern_seed)
+def picture_told(scene: Scene, view: int = 0) -> str:
+    """How much of its patterned wall a view's camera sees, as a sentence."""
+    (width_m, height_m), (across_m, up_m) = picture_on_wall_m(scene, view), wall_m(scene, view)
+    eye = scene.views[view]
+    seen = "a wall" if eye.wall == "y_max" else f"the wall {eye.wall}"
+    return f"the camera sees {width_m:.2f} x {height_m:.2f} m of {seen} of {across_m:g} x {up_m:g} m."
 
 
 def _rig(answers: Answers) -> RigSettings:
-    camera, projector = answers.camera, answers.projector
-    if camera.kind == "simulated":
-        told = {"room": TRUTH_FILE} | ({} if camera.exposure is None else {"exposure_s": camera.exposure})
-        device = SimulatedCameraSettings.model_validate(told)
-    else:
-        told = {
-            "kind": camera.kind,
-            "device": camera.device,
-            "pixel_format": camera.pixel_format,
-            "width_px": camera.width_px,
-            "height_px": camera.height_px,
-            "bits": camera.bits,
-            "exposure_s": camera.exposure,
-        }
-        device = (AravisCameraSettings if camera.kind == "aravis" else V4l2CameraSettings).model_validate(
-            told
-        )
+    projector = answers.projector
     spoken = ProjectorSettings(url=projector.url) if projector and projector.url else None
-    return RigSettings(camera=device, projector=spoken)
+    return RigSettings(
+        camera=device_of(answers.camera), cameras=devices_of(answers.view) or None, projector=spoken
+    )
 
 
 def _boundary(answers: Answers, room: Box) -> list[BoundaryInformation]:
@@ -199,7 +138,7 @@ def _walls(answers: Answers) -> list[Wall]:
 
 def object_of(item: ObjectAnswer, number: int, corner_m: Vector3 = (0.0, 0.0, 0.0)) -> RoomObject:
     """The box of one answer; `number` is its place among the answers. Raises SettingError."""
-    name, foot_m = f"{item.kind.replace('_', ' ')} {number + 1}", _moved(item.position, corner_m)
+    name, foot_m = f"{item.kind.replace('_', ' ')} {number + 1}", moved(item.position, corner_m)
     ready = ready_object(item.kind, name, foot_m, item.size)
     if item.temperature is not None:
         return replace(

@@ -1,4 +1,6 @@
-"""Several cameras on the page: one that failed is taken again alone, from beside its verdict."""
+"""Several cameras on the page: described, changed, and one that failed taken again alone."""
+
+import re
 
 import pytest
 from playwright.sync_api import expect
@@ -37,4 +39,45 @@ def test_a_camera_that_failed_is_taken_alone_from_beside_its_verdict(
     library.get_by_role("button", name=f"Take {VIEWS[0]} again").click()
     expect(library.get_by_role("img")).to_have_count(2)
     snapshot(page, "views-retaken")
+    assert watched.complaints == []
+
+
+def test_a_further_camera_is_added_changed_and_removed(station: Station, opens: Opens):
+    watched = opens(station.address)
+    page = watched.page
+    page.get_by_role("button", name="New experiment").click()
+    page.get_by_role("radio", name=re.compile("packaged room")).click()
+    page.get_by_role("button", name="Add a camera").click()
+    view = page.get_by_role("group", name="camera 2")
+    expect(view).to_contain_text("Its picture covers")
+    view.get_by_label("Distance to its wall").fill("3 kg")
+    expect(view).to_contain_text("'kg' is no unit of length")
+    expect(page.locator("button.next")).to_have_text("1 to correct")
+    view.get_by_label("Distance to its wall").fill("3.2")
+    view.get_by_label("Looks at the wall").select_option("x_min")
+    view.get_by_label("Pattern on its wall").select_option("projector")
+    view.get_by_label("Projector's lens, x").fill("-1")
+    expect(view).to_contain_text("at or behind the wall x_min")
+    snapshot(page, "views-wrong")
+    view.get_by_label("Projector's lens, x").fill("3")
+    page.locator("button.next", has_text="Create the experiment").click()
+    # From here on it is an experiment of two cameras, whose room can be edited.
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+    page.get_by_role("button", name="Edit room").click()
+    view = page.get_by_role("group", name="camera 2")
+    view.get_by_label("What it is called").fill("left")
+    expect(page.get_by_role("group", name="left")).to_contain_text("Its picture covers")
+    snapshot(page, "views-edited")
+    page.locator("button.next", has_text="Change the room").click()
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+    (found,) = station.app.state.services.folders.all()
+    scene = station.app.state.services.folders.open(found.name).settings.scene
+    assert [(one.name, one.wall) for one in scene.views] == [("camera", "y_max"), ("left", "x_min")]
+    page.get_by_role("button", name="Edit room").click()
+    page.get_by_role("button", name="Remove left").click()
+    expect(page.get_by_role("group", name="left")).to_have_count(0)
+    page.locator("button.next", has_text="Change the room").click()
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+    assert len(station.app.state.services.folders.open(found.name).settings.scene.views) == 1
+    expect(page.locator("footer")).to_contain_text("camera ready")
     assert watched.complaints == []

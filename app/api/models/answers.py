@@ -89,14 +89,24 @@ class SupplyTold(WireModel):
     flow_m3_h: float
 
 
+class ViewTold(WireModel):
+    """What a camera sees of its wall, and the wall itself: width and height as it sees them."""
+
+    name: str
+    wall: str
+    picture_m: list[float]
+    wall_m: list[float]
+
+
 class RoomTold(WireModel):
     """What the answers make: the picture on the patterned wall and the wall itself (width, height), the room's two
-    corners, the supplies, who stands where, and the settings in SI."""
+    corners, the supplies, what each camera sees, who stands where, and the settings in SI."""
 
     picture_m: list[float]
     wall_m: list[float]
     room_m: list[list[float]]
     supplies: list[SupplyTold]
+    views: list[ViewTold]
     standing: list[StandingResource]
     settings: dict[str, Any]
 

@@ -1,5 +1,6 @@
 """Answers about a rig and its room: templates, their check while somebody types, experiments made from them."""
 
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,6 +22,7 @@ from app.api.models.answers import (
     SentAnswers,
     SupplyTold,
     TemplateResource,
+    ViewTold,
 )
 from app.api.models.calibrations import StandingResource
 from app.api.models.experiments import ExperimentResource
@@ -53,9 +55,9 @@ from app.setup.experiment import (
     template,
 )
 from app.setup.mistakes import field_name, mistakes_in
-from app.setup.scene import picture_on_wall_m, settings_of
-from core.geometry import Box, Optics
-from core.scene import Inlet, ProjectedPattern
+from app.setup.scene import picture_on_wall_m, settings_of, wall_m
+from core.geometry import Box, Optics, WallName, face_of
+from core.scene import Inlet, Light, ProjectedPattern, Scene
 
 router = APIRouter(tags=["answers"])
 JPEG_BODY = body("image/jpeg", "What the camera sees, its contrast stretched for the eyes.")
@@ -190,28 +192,47 @@ def _refuse(wrong: list[Said]) -> None:
 
 def _told(settings: ExperimentSettings) -> RoomTold:
     scene = settings.scene
-    light = scene.light
-    thrown = (light.projector,) if isinstance(light, ProjectedPattern) else ()
-    camera = scene.views[0].camera
     return RoomTold(
-        picture_m=list(picture_on_wall_m(camera, scene.room)),
-        wall_m=[scene.room.size_m[0], scene.room.size_m[2]],
+        picture_m=list(picture_on_wall_m(scene)),
+        wall_m=list(wall_m(scene)),
         room_m=[list(scene.room.lower_m), list(scene.room.upper_m)],
         supplies=[_supply(n, one) for n, one in enumerate(p for p in scene.boundary if isinstance(p, Inlet))],
-        standing=[
-            _standing("camera", camera, scene.room),
-            *(_standing("projector", t, scene.room) for t in thrown),
+        views=[
+            ViewTold(
+                name=view.name,
+                wall=view.wall,
+                picture_m=list(picture_on_wall_m(scene, number)),
+                wall_m=list(wall_m(scene, number)),
+            )
+            for number, view in enumerate(scene.views)
         ],
+        standing=list(_all_standing(scene)),
         settings=to_plain(settings),
     )
 
 
-def _standing(role: Literal["camera", "projector"], optics: Optics, room: Box) -> StandingResource:
+def _all_standing(scene: Scene) -> Iterator[StandingResource]:
+    """Every camera, and every projector once, with what it covers of its wall."""
+    told: list[Light] = []
+    for view in scene.views:
+        yield _standing("camera", view.name, view.camera, view.wall, scene.room)
+        light = view.light or scene.light
+        if isinstance(light, ProjectedPattern) and light not in told:
+            told.append(light)
+            name = "projector" if len(told) == 1 else f"projector of {view.name}"
+            yield _standing("projector", name, light.projector, view.wall, scene.room)
+
+
+def _standing(
+    role: Literal["camera", "projector"], name: str, optics: Optics, wall: WallName, room: Box
+) -> StandingResource:
+    face = face_of(wall)
+    on_wall = np.array(room.upper_m if face.upper else room.lower_m)
     return StandingResource(
-        name=role,
+        name=name,
         role=role,
         position_m=list(optics.position_m),
-        corners_m=corners_on(optics, np.array(room.upper_m), np.array((0.0, 1.0, 0.0))),
+        corners_m=corners_on(optics, on_wall, -face.inward * np.eye(3)[face.axis]),
     )
 
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -77,6 +78,8 @@ print
 4 m
 20 ms
 50
+# Further cameras
+0
 """
 
 
@@ -173,6 +176,43 @@ def test_an_outlet_on_a_supply_is_asked_for_again_as_a_whole(tmp_path):
 
 # In place of "no objects": a ready one, and a box of its own size and heat.
 NO_OBJECTS, OBJECTS = "none\n0\n0\n0\n", "none\n0\n0\n{}"
+SECOND = """\
+1
+camera
+right
+x_max
+/dev/video0
+/dev/video2
+8 mm
+3.45 um
+1280
+960
+3.5
+projector
+5
+1
+1
+2
+40
+1920
+1200
+"""
+
+
+def test_a_further_camera_is_asked_for_and_each_slip_is_told_where_it_was_made(tmp_path):
+    text = JET.replace("/dev/video7", "/dev/video0").removesuffix("0\n") + SECOND
+    first = replace(CAMERA, device="/dev/video0")
+    told, script = answered(tmp_path / "lab", text, cameras=(first,))
+    slips = ("another camera is called 'camera'", "the device of 'camera'", "at or behind the wall x_max")
+    for slip, refused in zip(slips, script.refused, strict=True):
+        assert slip in refused
+    (view,) = told["view"]
+    assert (view["name"], view["wall"], view["distance"]) == ("right", "x_max", "3.5 m")
+    assert script.told[-1].startswith("the camera sees")
+    scene = open_experiment(tmp_path / "lab").settings.scene
+    assert [one.wall for one in scene.views] == ["y_max", "x_max"]
+
+
 PERSON, BOX = "seated_person\n2\n1\n0\n", "box\n50 cm\n0.4\n30 cm\n1\n2.5\n0.2 m\n"
 
 

@@ -6,7 +6,7 @@ import type { CheckResource } from "./schema";
 
 export type Path = (string | number)[];
 export type Tree = Record<string, unknown>;
-export const KINDS = ["supply", "outlet", "surface", "wall", "object", "thermometer", "anemometer"] as const;
+export const KINDS = ["supply", "outlet", "surface", "wall", "object", "thermometer", "anemometer", "view"] as const;
 export type Kind = (typeof KINDS)[number];
 
 const KEPT = "answers";
