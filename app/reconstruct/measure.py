@@ -13,7 +13,7 @@ from app.experiment.found import Found
 from app.reconstruct.bursts import burst_shifts, windows_among
 from app.reconstruct.cover import reached_from
 from app.reconstruct.drift import Agreement, agreement, mount, without_known_drift
-from app.reconstruct.found import what_stands
+from app.reconstruct.found import Standing, what_stands
 from app.reconstruct.pair import check_pair
 from app.reconstruct.short_mean import with_short_mean
 from app.reconstruct.unstated import past_objects
@@ -52,14 +52,17 @@ class Measurement:
     found: tuple[Found, ...] = ()
 
 
-def measure(captures: CapturePair, scene: Scene, watch: Watch = Watch()) -> Measurement:
+def measure(
+    captures: CapturePair, scene: Scene, watch: Watch = Watch(), standing: Standing | None = None
+) -> Measurement:
     """Measure every view of a reference and a flow. Raises BadInputError, SettingError, StoppedError.
 
-    What is measured of the bursts of a sequence is kept in `watch.store`, and taken from there.
+    What is measured of the bursts of a sequence is kept in `watch.store`, and taken from there. `standing` is what
+    the reference shows beside the stated, where that was looked for before.
     """
     reference, flow = captures.reference, captures.flow
     _check_captures(reference, flow, scene)
-    standing = what_stands(scene, [image.mean for image in reference.images])
+    standing = standing or what_stands(scene, [image.mean for image in reference.images])
     shifts, drifts, notes, views = [], [], [], []
     for index, view in enumerate(scene.views):
         shift, drift, note = _measure_view(scene, index, view, captures, standing.covered[index])

@@ -1,74 +1,62 @@
 """`draft` for a problem: choose the grid, build the straight-ray operators, solve for the temperature."""
 
-import jax
-import jax.numpy as jnp
+from collections.abc import Callable
+
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float, Int
+from scipy import sparse
 
 from core.data_error import WALL_MARGIN
 from core.known_temperature import VertexGrid
-from core.motion import WithoutMotion
 from core.problem import Problem
-from core.rays.operator import StraightRayOperator, build
+from core.rays.matrix import as_matrix
+from core.rays.operator import build
 from core.rays.visibility import away_from_walls
 from core.result import Solution
 from core.scene import Scene
 from core.solve.check import check_problem
-from core.solve.draft.conjugate_gradients import Product
+from core.solve.draft.conjugate_gradients import Volume
 from core.solve.draft.temperature import solve_temperature
 from core.solve.draft.temperature_prior import TemperatureSettings
 from core.view_frame import looked_along
 from core.watch import Watch
 
-_apply = jax.jit(lambda operator, values: operator.apply(values))
-_transpose = jax.jit(lambda operator, shift: operator.transpose(shift))
+# The operator of a view, for windows at these centres.
+RaysOf = Callable[[int, Float[np.ndarray, "windows 2"]], "RayMatrix"]
 
 
-@jax.jit
-def _normal(
-    operator: StraightRayOperator, weight: Array, still: WithoutMotion | None, values: Array
-) -> Array:
-    shift = operator.apply(values)
-    if still is not None:
-        shift = shift - still.out @ jnp.einsum("wap,wa->p", still.along, shift)
-    shift = jnp.einsum("wab,wb->wa", weight, shift)
-    if still is not None:
-        shift = shift - still.along @ jnp.einsum("wap,wa->p", still.out, shift)
-    return operator.transpose(shift)
+class RayMatrix:
+    """A `ShiftOperator` that is a sparse matrix: the rays of a view through the grid, for NumPy arrays in float64.
 
-
-class _OnTheDevice:
-    """A `ShiftOperator` for NumPy arrays, in float64: compiled once, the weights passed as arguments.
-
-    Along the view the data say nothing, and conjugate gradients then stall on float32's rounding.
+    Along the view the data say nothing, and conjugate gradients would stall on float32's rounding.
     """
 
-    def __init__(self, operator: StraightRayOperator) -> None:
-        with jax.enable_x64(True):
-            self._operator = jax.tree.map(_widened, operator)
+    def __init__(self, matrix: sparse.csr_array, shape: tuple[int, int, int]) -> None:
+        self._matrix, self._back, self._shape = matrix, sparse.csr_array(matrix.T.tocsr()), shape
 
-    def apply(self, values: Float[np.ndarray, "nx ny nz"]) -> Float[np.ndarray, "windows 2"]:
-        with jax.enable_x64(True):
-            return np.asarray(_apply(self._operator, jnp.asarray(values, jnp.float64)))
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        view: int,
+        centres_px: Float[np.ndarray, "windows 2"],
+        grid: VertexGrid,
+        window_px: int,
+    ) -> "RayMatrix":
+        """Of windows of a view. Raises SettingError for none."""
+        return cls(as_matrix(build(scene, view, centres_px, grid.shape, float(window_px))), grid.shape)
 
-    def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Float[np.ndarray, "nx ny nz"]:
-        with jax.enable_x64(True):
-            return np.asarray(_transpose(self._operator, jnp.asarray(displacement_px, jnp.float64)))
+    def at(self, chosen: Int[np.ndarray, " some"]) -> "RayMatrix":
+        """Of some of the windows, by their numbers."""
+        return RayMatrix(self._matrix[np.stack([2 * chosen, 2 * chosen + 1], axis=1).ravel()], self._shape)
 
-    def normal(self, weight: Float[np.ndarray, "windows 2 2"], still: WithoutMotion | None = None) -> Product:
-        """One program for all three products: an iteration waits for it once."""
-        with jax.enable_x64(True):
-            fixed = (self._operator, jnp.asarray(weight), jax.tree.map(jnp.asarray, still))
+    def apply(self, values: Volume) -> Float[np.ndarray, "windows 2"]:
+        """Displacement [px] of every window."""
+        return (self._matrix @ values.ravel()).reshape(-1, 2)
 
-        def product(values: Float[np.ndarray, "nx ny nz"]) -> Float[np.ndarray, "nx ny nz"]:
-            with jax.enable_x64(True):
-                return np.asarray(_normal(*fixed, jnp.asarray(values, jnp.float64)))
-
-        return product
-
-
-def _widened(leaf: Array) -> Array:
-    return leaf.astype(jnp.float64) if jnp.issubdtype(leaf.dtype, jnp.floating) else leaf
+    def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Volume:
+        """The transposed map."""
+        return (self._back @ displacement_px.ravel()).reshape(self._shape)
 
 
 def draft_grid(scene: Scene) -> VertexGrid:
@@ -84,17 +72,23 @@ def draft_grid(scene: Scene) -> VertexGrid:
 
 
 def solve_draft(
-    problem: Problem, settings: TemperatureSettings = TemperatureSettings(), watch: Watch = Watch()
+    problem: Problem,
+    settings: TemperatureSettings = TemperatureSettings(),
+    watch: Watch = Watch(),
+    rays: RaysOf | None = None,
 ) -> Solution:
     """Temperature in at most some ten seconds; nothing is kept of one that is stopped.
 
-    Raises SettingError, StoppedError.
+    `rays` gives what was built before, for windows of the draft's grid; left out, it is built. Raises SettingError,
+    StoppedError.
     """
     check_problem(problem, "bos+boundary")
     problem = _past_layers(problem)
     grid = draft_grid(problem.scene)
     operators = tuple(
-        _OnTheDevice(build(problem.scene, view, shift.centres_px, grid.shape, float(shift.window_px)))
+        rays(view, shift.centres_px)
+        if rays
+        else RayMatrix.of(problem.scene, view, shift.centres_px, grid, shift.window_px)
         for view, shift in enumerate(problem.shifts)
     )
     return solve_temperature(problem, operators, grid, settings, watch)

@@ -200,7 +200,7 @@ def _minimise(
 def _right_hand_side(system: System, shifts: tuple[ShiftMeasurement, ...], prior: Volume, air: Air) -> Volume:
     """Minus the gradient at the prior."""
     known, ambient = system.known, air.ambient_temperature_k
-    rhs = -system.data_product()(prior) - system.known_terms(prior)
+    rhs = -system.data_terms(prior) - system.known_terms(prior)
     for operator, weight, shift in zip(system.operators, system.weights, shifts, strict=True):
         rhs += operator.transpose(np.einsum("wab,wb->wa", weight, shift.displacement_px))
     target = excess(air, np.where(known.mask, known.temperature_k, ambient) - ambient)
@@ -221,10 +221,9 @@ def _solved(
     record: Callable[[Volume], object] = lambda found: None,
 ) -> tuple[Volume, bool]:
     """The Hessian's inverse times `rhs`, and whether it was reached. Raises StoppedError between two products."""
-    data_terms = system.data_product()
 
     def hessian(n: Volume) -> Volume:
         watch.check_stop()
-        return data_terms(n) + system.known_terms(n) + system.smooth(n)
+        return system.data_terms(n) + system.known_terms(n) + system.smooth(n)
 
     return conjugate_gradients(hessian, inverse, rhs, tolerance, settings.max_iterations, record)

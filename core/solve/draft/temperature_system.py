@@ -35,10 +35,6 @@ class ShiftOperator(Protocol):
         """The transposed map."""
         ...
 
-    def normal(self, weight: Float[np.ndarray, "windows 2 2"], still: WithoutMotion | None = None) -> Product:
-        """The map, weights, and the map transposed, as one; `still` takes shared errors out between them."""
-        ...
-
 
 @dataclass(frozen=True)
 class System:
@@ -85,12 +81,12 @@ class System:
             flat[members] += n.reshape(-1)[members].mean() / (len(members) * (std * self.per_k) ** 2)
         return total
 
-    def data_product(self) -> Product:
-        """What multiplies n with the Hessian of the data."""
-        parts = [
-            operator.normal(weight) for operator, weight in zip(self.operators, self.weights, strict=True)
-        ]
-        return lambda n: sum((part(n) for part in parts), np.zeros_like(n))
+    def data_terms(self, n: Volume) -> Volume:
+        """Hessian of the data, times n."""
+        total = np.zeros_like(n)
+        for operator, weight in zip(self.operators, self.weights, strict=True):
+            total += operator.transpose(np.einsum("wab,wb->wa", weight, operator.apply(n)))
+        return total
 
 
 @dataclass(frozen=True)
@@ -107,12 +103,6 @@ class StillOperator:
     def transpose(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Volume:
         """The transposed map."""
         return self.rays.transpose(self.still.transpose(displacement_px))
-
-    def normal(self, weight: Float[np.ndarray, "windows 2 2"], still: WithoutMotion | None = None) -> Product:
-        """The map, weights, and the map transposed, as one. Nothing else can be taken out of it: `still` is None."""
-        if still is not None:
-            raise ValueError("A StillOperator has taken its shared errors out; expected none to be named.")
-        return self.rays.normal(weight, self.still)
 
 
 def without_shared_errors(
