@@ -97,7 +97,7 @@ def outlets_apart_k(
 
 
 def _along_wall_k2(box: Box, patch: Patch, room: RoomFields) -> float:
-    """Variance of T on the vertices beside the patch's wall, at the heights of the patch."""
+    """Variance along the patch's wall of the air beside it; what leaves is a mean over the patch's heights."""
     face = face_of(patch.wall)
     beside = np.take(room.excess_k, 1 if face.end == 0 else -2, axis=face.axis)[1:-1]
     if face.axis == 2:
@@ -105,7 +105,7 @@ def _along_wall_k2(box: Box, patch: Patch, room: RoomFields) -> float:
     heights_m = np.linspace(box.lower_m[2], box.upper_m[2], beside.shape[1])
     nearest = np.abs(heights_m - 0.5 * (patch.lower_m[1] + patch.upper_m[1]))
     within = nearest <= max(0.5 * (patch.upper_m[1] - patch.lower_m[1]), nearest.min())
-    return float(beside[:, within].var())
+    return float(beside[:, within].mean(1).var())
 
 
 def _from_height_k(data: Observations, room: RoomFields) -> Float[np.ndarray, " outlets"]:

@@ -83,6 +83,9 @@ def test_an_outlet_may_draw_from_any_place_along_its_wall_at_its_heights():
     excess_k[1, 1:4, 1:3] = 3.0
     excess_k[1, :, 5] = -9.0
     excess_k[-2, 2, 1] = -9.0
+    # Layers count by their mean: an outlet mixes its heights.
+    excess_k[:, :, 1] += 0.7
+    excess_k[:, :, 2] -= 0.7
     room = RoomFields(excess_k, 0.0 * excess_k, np.zeros((*VERTICES, 3)), np.array([5.0]))
 
     # Three of the six places between the side walls are 2 K colder.
