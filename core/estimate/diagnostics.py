@@ -6,6 +6,7 @@ from scipy.stats import norm
 
 from core.estimate.explained import Explained
 from core.estimate.least_squares import Posterior
+from core.estimate.model_error import ModelError
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior, looked_through
 from core.known import leaving_excess_k, stated_walls, unknown_walls
@@ -18,8 +19,6 @@ _FALSE_ALARMS = 0.05
 _INTERVAL = 1.96
 # Missing heat is reported above this share of the heat that the supplies bring.
 _MISSING_SHARE = 0.1
-# The scene is called incomplete if more than this share of the shifts (rms) is unexplained.
-_POOR_FIT = 0.35
 # The velocity is called doubtful if more than this share of it (rms) is expected to be wrong.
 _DOUBTFUL = 0.5
 # Correlation of the measured shifts with those of the room as stated, below which they went the other way.
@@ -122,20 +121,20 @@ def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
     ]
 
 
-def misfit(data: Observations, seen: Explained) -> list[str]:
-    """How much of the measured shifts is left unexplained, with a warning if it is much."""
+def misfit(data: Observations, seen: Explained, error: ModelError) -> list[str]:
+    """How much of the measured shifts is left unexplained, with a warning where the room lacks something."""
     if not data.shifts:
         return []
     share = seen.share_left
     said = f"{100 * share:.0f} % (rms) of the measured shifts is left unexplained by the fitted room"
     if not seen.stands_out:
         return [f"{said}, no more than their noise may be misjudged by."]
-    if share <= _POOR_FIT:
+    if not error.lacks:
         return [f"{said}."]
     return [
-        f"{said}.",
-        "The closure or the stated boundary cannot explain these images. Check inlets, outlets and heaters for "
-        "something that is not in the scene.",
+        f"{said}: {error.size:.1f} times what models of the air differ in.",
+        "The stated boundary cannot explain these images. Check inlets, outlets and heaters for something that is "
+        "not in the scene.",
     ]
 
 

@@ -9,7 +9,8 @@ parameters would move if the data were the other model's, D and J the derivative
 fit could not take up; two models that are equally wrong by themselves differ by sqrt(2) times as much as either is
 wrong. <> is a mean over a correlation length. k is the ratio of what the fitted room leaves of the images, beyond
 their noise, to what d / sqrt(2) would leave: expected to be 1, known within a factor e, and moved by the likelihood.
-Where the images do not tell two models apart it stays 1.
+Where the images do not tell two models apart it stays 1. A k that is too large for that says
+that the room lacks something, such as a heater that nobody stated.
 
 d at a point is one draw of three components. An error whose variance is known from three squares has Student's t
 distribution with nu = 3 (Gosset, Biometrika 6 (1908)), whose standard deviation is sqrt(3) times as large.
@@ -20,6 +21,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import ndimage
 from scipy.optimize import minimize_scalar
+from scipy.stats import norm
 
 from core.data_error import CORRELATED_DATA
 from core.estimate.discrepancy import LENGTH_SHARE
@@ -35,6 +37,8 @@ _STUDENT = 3.0
 _EACH = 0.5
 # Of the logarithm of k: within e^4 either way.
 _FARTHEST = 4.0
+# One room in twenty that lacks nothing is said to lack something.
+_FALSE_ALARMS = 0.05
 
 
 class ModelError(eqx.Module):
@@ -46,6 +50,14 @@ class ModelError(eqx.Module):
     pairs: tuple[Pair, ...]
     moved: Float[np.ndarray, "pairs active"]
     size: float
+
+    @property
+    def lacks(self) -> bool:
+        """Whether the room lacks something: what it leaves of the images is more than models of the air differ in.
+
+        Their logarithms have a standard deviation of 1 (`size_of`).
+        """
+        return bool(np.log(self.size) > norm.ppf(1.0 - _FALSE_ALARMS))
 
     def deviation(
         self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]

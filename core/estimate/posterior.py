@@ -111,7 +111,7 @@ def sentences(analysis: Analysis, error: ModelError, doubt: float) -> list[str]:
         *analysis.layout.notes,
         *undetermined(analysis.problem),
         *contradictions(analysis.problem, analysis.prior, analysis.posterior, np.abs(error.moved[0]), doubt),
-        *misfit(analysis.data, explained(analysis.data, analysis.best.fields)),
+        *misfit(analysis.data, explained(analysis.data, analysis.best.fields), error),
         *doubtful(doubt),
         *other_way(likeness(analysis.data, analysis.stated_room)),
         *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, held_k_m3_s(analysis)),

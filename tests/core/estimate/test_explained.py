@@ -10,6 +10,7 @@ import pytest
 from core.estimate.diagnostics import contradictions, misfit, other_way
 from core.estimate.explained import explained, likeness
 from core.estimate.least_squares import Posterior
+from core.estimate.model_error import ModelError
 from core.estimate.observation import observations
 from core.problem import Problem, ShiftMeasurement
 from core.room.vertices import RoomFields
@@ -112,11 +113,14 @@ def test_of_rooms_with_right_entries_one_in_twenty_has_such_a_sentence():
     assert 0.01 < alarms / 400 < 0.08
 
 
-@pytest.mark.parametrize(("noise", "doubted"), [(0.1, True), (3.0, False)])
-def test_a_room_is_doubted_for_what_stands_out_of_the_noise_alone(noise, doubted):
+@pytest.mark.parametrize(
+    ("noise", "size", "doubted"), [(0.1, 8.0, True), (0.1, 2.0, False), (3.0, 8.0, False)]
+)
+def test_a_room_is_doubted_for_what_is_more_than_noise_and_more_than_models_differ_in(noise, size, doubted):
     data = observations(seen(4.0, noise), VERTICES)
+    error = ModelError((), np.zeros((0, 0)), size)
 
-    said = " ".join(misfit(data, explained(data, room_of(1.0))))
+    said = " ".join(misfit(data, explained(data, room_of(1.0)), error))
 
     assert ("cannot explain these images" in said) == doubted
-    assert ("no more than their noise" in said) != doubted
+    assert ("no more than their noise" in said) == (noise > 1.0)

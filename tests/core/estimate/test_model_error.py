@@ -31,6 +31,13 @@ def test_the_size_is_that_of_what_is_left_beyond_the_noise(true_size: float):
     assert size_of(left, noise, apart) == pytest.approx(true_size, rel=0.02)
 
 
+def test_of_rooms_that_lack_nothing_one_in_twenty_is_said_to_lack_something():
+    sizes = np.exp(np.random.default_rng(6).standard_normal(2000))
+    lacking = [ModelError((), np.zeros((0, 0)), float(size)).lacks for size in sizes]
+
+    assert 0.03 < np.mean(lacking) < 0.07
+
+
 def test_without_a_word_of_the_images_the_size_is_one():
     draw = np.random.default_rng(4)
     noise = draw.normal(size=int(CORRELATED_DATA) * 200)
