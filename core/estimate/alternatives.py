@@ -9,8 +9,7 @@ from core.estimate.forward_runs import RoomSettings, other_closure
 from core.estimate.marches import Marches
 from core.estimate.parameter_fit import Background
 from core.estimate.posterior import Analysis, model_error_of
-from core.estimate.unstated_heat import with_suspected_heat
-from core.problem import Problem
+from core.estimate.unstated_heat import Suspect, likeliest
 from core.room.forward import Room
 
 # Share of the measured shifts (rms) that a fitted room leaves unexplained. At 48 cells rooms with the right closure
@@ -32,14 +31,14 @@ def lacks_something(analysis: Analysis) -> bool:
 
 def suspected_heat(
     analysis: Analysis, background: Background, settings: RoomSettings, marches: Marches
-) -> Problem | None:
-    """The problem with a heater added that nobody stated; None where no such heater would help.
+) -> Suspect | None:
+    """The strip of floor whose heat may be missing; None where nothing is, or no strip would explain anything.
 
     It is looked for only where walls are unknown and the fitted room lacks something.
     """
     if not settings.use_images or not background.prior.unknown_walls() or not lacks_something(analysis):
         return None
-    return with_suspected_heat(background, analysis.data, settings, marches)
+    return likeliest(background, analysis.data, settings, marches)
 
 
 def promising_closure(analysis: Analysis, coarse: Room) -> str | None:

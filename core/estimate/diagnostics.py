@@ -121,6 +121,15 @@ def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
     ]
 
 
+def missing_heat(strip: SuspectedHeater, likeness: float) -> str:
+    """A sentence about a strip of floor where heat may be missing that the room's fit could not make use of."""
+    low, high = strip.patch.lower_m[0], strip.patch.upper_m[0]
+    return (
+        f"Heat on the floor at x = {low:.1f} to {high:.1f} m would change the pictures as what is left unexplained "
+        f"differs (correlation {likeness:.2f}). Look for a source that rises there, at any depth, and state it."
+    )
+
+
 def misfit(data: Observations, seen: Explained, error: ModelError) -> list[str]:
     """How much of the measured shifts is left unexplained, with a warning where the room lacks something."""
     if not data.shifts:
@@ -132,9 +141,9 @@ def misfit(data: Observations, seen: Explained, error: ModelError) -> list[str]:
     if not error.lacks:
         return [f"{said}."]
     return [
-        f"{said}: {error.size:.1f} times what models of the air differ in.",
+        f"{said}, more than models of the air differ in.",
         "The stated boundary cannot explain these images. Check inlets, outlets and heaters for something that is "
-        "not in the scene.",
+        "not in the scene; until it is stated, distrust the velocity.",
     ]
 
 

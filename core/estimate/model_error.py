@@ -9,8 +9,8 @@ parameters would move if the data were the other model's, D and J the derivative
 fit could not take up; two models that are equally wrong by themselves differ by sqrt(2) times as much as either is
 wrong. <> is a mean over a correlation length. k is the ratio of what the fitted room leaves of the images, beyond
 their noise, to what d / sqrt(2) would leave: expected to be 1, known within a factor e, and moved by the likelihood.
-Where the images do not tell two models apart it stays 1. A k that is too large for that says
-that the room lacks something, such as a heater that nobody stated.
+Where the images do not tell two models apart it stays 1. A room that leaves far more of the
+images than models differ in lacks something, such as a heater that nobody stated.
 
 d at a point is one draw of three components. An error whose variance is known from three squares has Student's t
 distribution with nu = 3 (Gosset, Biometrika 6 (1908)), whose standard deviation is sqrt(3) times as large.
@@ -44,20 +44,19 @@ _FALSE_ALARMS = 0.05
 class ModelError(eqx.Module):
     """Pairs of rooms that differ in the model alone, how each would move the parameters, and the size k.
 
-    `moved` is in prior deviations.
+    `moved` is in prior deviations. `left_ratio` is what the room leaves of the images beyond their noise, over what
+    the pairs would leave, both rms: k without the prior.
     """
 
     pairs: tuple[Pair, ...]
     moved: Float[np.ndarray, "pairs active"]
     size: float
+    left_ratio: float
 
     @property
     def lacks(self) -> bool:
-        """Whether the room lacks something: what it leaves of the images is more than models of the air differ in.
-
-        Their logarithms have a standard deviation of 1 (`size_of`).
-        """
-        return bool(np.log(self.size) > norm.ppf(1.0 - _FALSE_ALARMS))
+        """Whether the room lacks something: it leaves more of the images than k may be, in 19 rooms of 20."""
+        return self.left_ratio > float(np.exp(norm.ppf(1.0 - _FALSE_ALARMS)))
 
     def deviation(
         self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]
@@ -95,7 +94,21 @@ def model_error(
     images = group == IMAGES
     left = (values - data.predicted(found))[images]
     apart = np.stack([s - jacobian @ m for s, m in zip(shown, moved, strict=True)])[:, images]
-    return ModelError(pairs, moved, size_of(left, noise[images], apart))
+    return ModelError(
+        pairs, moved, size_of(left, noise[images], apart), _left_ratio(left, noise[images], apart)
+    )
+
+
+def _left_ratio(
+    left: Float[np.ndarray, " data"],
+    noise: Float[np.ndarray, " data"],
+    apart: Float[np.ndarray, "pairs data"],
+) -> float:
+    if not len(left):
+        return 1.0
+    beyond = max(float(np.mean(left**2) - np.mean(noise)), 0.0)
+    unit = _EACH * float(np.mean(np.sum(apart**2, axis=0)))
+    return float(np.sqrt(beyond / max(unit, float(np.finfo(np.float32).tiny))))
 
 
 def size_of(

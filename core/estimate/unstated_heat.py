@@ -1,10 +1,15 @@
 """A heat source that nobody stated: find the strip of floor that explains the images best.
 
 The coarse room is marched with a heated panel on each of five strips of floor in turn, and then on the two strips
-half-way to the neighbours of the best one. Each panel is made warmer as long as the misfit falls. Forward runs are
-compared, not derivatives, since a plume is far from linear in its heat. One view shows where along x the air rises
-but not how deep in the room, so the strips lie in the middle of the room's depth. The best strip enters the fit as
-a heater with a prior deviation of half its heat, and so do its neighbours on both sides.
+half-way to the neighbours of the best one. A panel is compared by what it would leave of the images' residual r if
+the change d that it makes could be scaled:
+
+    |r - a d|^2 / |r|^2 = 1 - c^2,    c = <r, d> / (|r| |d|),    a = <r, d> / |d|^2
+
+A plume beside its true place, or too strong, would make the misfit itself larger. Each panel is made warmer as long
+as the correlation c rises; a times its heat is what the images ask for. One view shows where along x the air rises
+but not how deep in the room, so the strips lie in the middle of the room's depth. The best strip enters the fit as a
+heater with a prior deviation of half its heat, and so do its neighbours on both sides.
 """
 
 from collections.abc import Sequence
@@ -15,12 +20,12 @@ from typing import NamedTuple
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import Float
 
 from core.estimate.forward_runs import RoomSettings, march_under
 from core.estimate.marches import Marches
-from core.estimate.observation import Observations
+from core.estimate.observation import IMAGES, Observations
 from core.estimate.parameter_fit import Background
-from core.estimate.parameter_step import misfit_ratio
 from core.estimate.prior import room_prior
 from core.known import leaving_excess_k, share_area
 from core.problem import Problem
@@ -35,64 +40,68 @@ _STRIPS, _DEPTH_SHARE = 5, 0.2
 _LADDER_K = (15.0, 30.0, 60.0, 120.0)
 # Prior deviation of the found heat, as a share of it.
 _STD_SHARE = 0.5
-# A strip enters a fit if the room with it has less than this share of the misfit of the room without.
-_WORTHWHILE = 0.8
 
 _DOING = "look for heat that nobody stated"
 
 
-def with_suspected_heat(
-    background: Background, data: Observations, settings: RoomSettings, marches: Marches
-) -> Problem | None:
-    """The problem with the best strip and its neighbours as heaters; None if no strip helps enough."""
-    strips = floor_strips(background.problem)
-    climbs = climbed_each(strips, background, data, settings, marches)
-    if min((climb.left for climb in climbs), default=1.0) > _WORTHWHILE:
-        return None
-    best = min(climbs, key=lambda climb: climb.left)
-    # A panel may lie half on one strip and half on the next.
-    between = floor_strips(background.problem, between=True)
-    halves = [strip for strip in between if share_area(strip.patch, best.strip.patch)]
-    best = min(
-        (best, *climbed_each(halves, background, data, settings, marches)), key=lambda climb: climb.left
-    )
-    marches.record({"doing": _DOING, "suspected_k": best.heat_k, "misfit_left": best.left})
-    warm = replace(best.strip, temperature_k=best.strip.temperature_k + best.heat_k)
-    beside = [strip for strip in (*strips, *between) if adjoin(strip, warm)]
-    return with_heaters(
-        background.problem, [replace(s, temperature_std_k=_STD_SHARE * best.heat_k) for s in (warm, *beside)]
-    )
+class Suspect(NamedTuple):
+    """A strip, the heat that the images ask of it, and how its change of the images correlates with what is left."""
 
-
-class Climb(NamedTuple):
-    """The best heat of a strip, and its misfit as a share of that of the room without it."""
-
-    left: float
+    likeness: float
     heat_k: float
     strip: SuspectedHeater
 
 
-def climbed_each(
+def likeliest(
+    background: Background, data: Observations, settings: RoomSettings, marches: Marches
+) -> Suspect | None:
+    """The strip of floor whose heat explains the images best; None if none explains anything."""
+    strips = floor_strips(background.problem)
+    suspects = warmed_each(strips, background, data, settings, marches)
+    if max((suspect.likeness for suspect in suspects), default=0.0) <= 0.0:
+        return None
+    best = max(suspects, key=lambda suspect: suspect.likeness)
+    # A panel may lie half on one strip and half on the next.
+    between = floor_strips(background.problem, between=True)
+    halves = [strip for strip in between if share_area(strip.patch, best.strip.patch)]
+    best = max(
+        (best, *warmed_each(halves, background, data, settings, marches)),
+        key=lambda suspect: suspect.likeness,
+    )
+    marches.record({"doing": _DOING, "suspected_k": best.heat_k, "likeness": best.likeness})
+    return best
+
+
+def with_suspected_heat(problem: Problem, suspect: Suspect) -> Problem:
+    """The problem with the strip and its neighbours as heaters."""
+    strips = (strip for between in (False, True) for strip in floor_strips(problem, between=between))
+    warm = replace(suspect.strip, temperature_k=suspect.strip.temperature_k + suspect.heat_k)
+    beside = [strip for strip in strips if adjoin(strip, warm)]
+    std_k = _STD_SHARE * suspect.heat_k
+    return with_heaters(problem, [replace(strip, temperature_std_k=std_k) for strip in (warm, *beside)])
+
+
+def warmed_each(
     strips: Sequence[SuspectedHeater],
     background: Background,
     data: Observations,
     settings: RoomSettings,
     marches: Marches,
-) -> list[Climb]:
+) -> list[Suspect]:
     """The best heat of each strip, each tried by itself."""
     cold = with_heaters(background.problem, strips)
     coarse = room(cold.scene, settings.coarse_cells, background.coarse.closure)
     mean = room_prior(cold, coarse.layout).mean
     before = len(mean.heater_excess_k) - len(strips)
 
-    def climb(n: int) -> Climb:
-        return Climb(*climbed(before + n, coarse, mean, background, data, settings, marches), strips[n])
+    def warmed(n: int) -> Suspect:
+        return Suspect(*_warmed(before + n, coarse, mean, background, data, settings, marches), strips[n])
 
     with ThreadPoolExecutor(settings.threads) as pool:
-        return list(pool.map(climb, range(len(strips))))
+        return list(pool.map(warmed, range(len(strips))))
 
 
-def climbed(
+def _warmed(
     heater: int,
     coarse: Room,
     mean: RoomParameters,
@@ -101,16 +110,33 @@ def climbed(
     settings: RoomSettings,
     marches: Marches,
 ) -> tuple[float, float]:
-    """Least misfit with this heater, over that of the room without it, and its temperature above the air."""
-    least, best_k, flow = np.inf, 0.0, background.base.flow.last
+    """Greatest correlation with this heater, 0 if it is negative, and the heat that the images ask of it [K]."""
+    values, variance, group = data.values()
+    images = group == IMAGES
+    before = data.predicted(background.base.fields)
+    best, best_k, flow = 0.0, 0.0, background.base.flow.last
     for heat_k in _LADDER_K:
         warm = eqx.tree_at(lambda p: p.heater_excess_k, mean, mean.heater_excess_k.at[heater].add(heat_k))
         tried = march_under(coarse, warm, flow, settings.restart_s, data.vertices, marches)
-        left = misfit_ratio(data, tried, background.base)
-        if left > least:
+        change = data.predicted(tried.fields) - before
+        likeness, scale = matched((values - before)[images], change[images], variance[images])
+        if likeness <= best:
             break
-        least, best_k, flow = left, heat_k, tried.flow.last
-    return least, best_k
+        best, best_k, flow = likeness, scale * heat_k, tried.flow.last
+    return best, best_k
+
+
+def matched(
+    left: Float[np.ndarray, " data"], change: Float[np.ndarray, " data"], noise: Float[np.ndarray, " data"]
+) -> tuple[float, float]:
+    """Correlation of what is left with a change, and the factor on the change that explains most of what is left.
+
+    Each datum counts by its noise and by how large what is left is on the mean.
+    """
+    weight = 1.0 / (noise + np.mean(left**2))
+    common, own, all_left = (float(np.sum(weight * f)) for f in (left * change, change**2, left**2))
+    tiny = float(np.finfo(np.float32).tiny)
+    return common / max(float(np.sqrt(own * all_left)), tiny), common / max(own, tiny)
 
 
 def floor_strips(problem: Problem, *, between: bool = False) -> list[SuspectedHeater]:

@@ -12,7 +12,7 @@ import numpy as np
 from core.checkpoint import digest
 from core.drift import motion_hides
 from core.estimate.alternatives import KEEP_HEAT, left_over, promising_closure, suspected_heat
-from core.estimate.diagnostics import another_closure
+from core.estimate.diagnostics import another_closure, missing_heat
 from core.estimate.ensemble import ensemble_fit
 from core.estimate.forward_runs import (
     Derivatives,
@@ -33,6 +33,7 @@ from core.estimate.posterior import Analysis, solution
 from core.estimate.prior import room_prior
 from core.estimate.schedule import fit_work
 from core.estimate.temperature_nudging import outlets_apart_k
+from core.estimate.unstated_heat import with_suspected_heat
 from core.problem import Problem
 from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
@@ -96,13 +97,16 @@ def analyse(background: Background, problem: Problem, settings: RoomSettings, ma
         if left_over(again) < left_over(analysis):
             notes = (another_closure(name, left_over(again), background.coarse.closure, left_over(analysis)),)
             analysis = again
-    warm = suspected_heat(analysis, background, settings, marches)
-    if warm is not None:
+    suspect = suspected_heat(analysis, background, settings, marches)
+    if suspect is not None:
+        warm = with_suspected_heat(background.problem, suspect)
         again = fitted_room(
             background_of(warm, settings, marches, background.coarse.closure), problem, settings, marches
         )
         if left_over(again) < KEEP_HEAT * left_over(analysis):
             notes, analysis = (), again
+        else:
+            notes = (*notes, missing_heat(suspect.strip, suspect.likeness))
     doing = "take the room that was found"
     marches.record({"doing": doing, **supplied(analysis.layout, analysis.best)})
     found = solution(analysis, marches.elapsed_s, use_images=settings.use_images, notes=notes)

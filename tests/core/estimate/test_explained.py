@@ -114,11 +114,11 @@ def test_of_rooms_with_right_entries_one_in_twenty_has_such_a_sentence():
 
 
 @pytest.mark.parametrize(
-    ("noise", "size", "doubted"), [(0.1, 8.0, True), (0.1, 2.0, False), (3.0, 8.0, False)]
+    ("noise", "ratio", "doubted"), [(0.1, 8.0, True), (0.1, 2.0, False), (3.0, 8.0, False)]
 )
-def test_a_room_is_doubted_for_what_is_more_than_noise_and_more_than_models_differ_in(noise, size, doubted):
+def test_a_room_is_doubted_for_what_is_more_than_noise_and_more_than_models_differ_in(noise, ratio, doubted):
     data = observations(seen(4.0, noise), VERTICES)
-    error = ModelError((), np.zeros((0, 0)), size)
+    error = ModelError((), np.zeros((0, 0)), 1.0, ratio)
 
     said = " ".join(misfit(data, explained(data, room_of(1.0)), error))
 

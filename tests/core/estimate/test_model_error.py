@@ -33,7 +33,7 @@ def test_the_size_is_that_of_what_is_left_beyond_the_noise(true_size: float):
 
 def test_of_rooms_that_lack_nothing_one_in_twenty_is_said_to_lack_something():
     sizes = np.exp(np.random.default_rng(6).standard_normal(2000))
-    lacking = [ModelError((), np.zeros((0, 0)), float(size)).lacks for size in sizes]
+    lacking = [ModelError((), np.zeros((0, 0)), 1.0, float(size)).lacks for size in sizes]
 
     assert 0.03 < np.mean(lacking) < 0.07
 
@@ -55,13 +55,19 @@ def test_a_model_that_explains_the_images_is_believed_more_than_one_that_does_no
     nothing = Derivatives(own, [], np.zeros((0, 0)))
 
     right, wrong = (
-        model_error(data, posterior, nothing, (pair,), room_of(found_k)).size for found_k in (4.0, 2.0)
+        model_error(data, posterior, nothing, (pair,), room_of(found_k)) for found_k in (4.0, 2.0)
     )
 
     # Half of 4 K is left, where either of two models that differ by 1 K is wrong by 0.7 K; these few windows move k a
     # part of the way to 2.8.
-    assert right < 0.6
-    assert 1.8 < wrong < 2.8
+    assert right.size < 0.6
+    assert 1.8 < wrong.size < 2.8
+    assert wrong.left_ratio == pytest.approx(2.8, abs=0.2)
+    assert not wrong.lacks
+    same = model_error(data, posterior, nothing, ((own, own),), room_of(2.0))
+    # Models that do not differ at all explain nothing.
+    assert same.size == pytest.approx(1.0)
+    assert same.lacks
 
 
 def replace_excess(room: RoomFields, other: RoomFields) -> RoomFields:
@@ -93,13 +99,13 @@ def test_what_the_fit_takes_up_is_no_error():
 def test_intervals_hold_errors_of_the_kind_that_they_are_made_from():
     draw = np.random.default_rng(5)
     one, other, error = (0.1 * draw.normal(size=(*SHAPE, 3)) for _ in range(3))
-    apart = ModelError(((still(one), still(other)),), np.zeros((1, 0)), 1.0)
+    apart = ModelError(((still(one), still(other)),), np.zeros((1, 0)), 1.0, 1.0)
 
     std = apart.deviation("velocity_m_s", np.zeros((0, *SHAPE, 3)))
 
     assert np.mean(np.abs(error) < 1.96 * std) > 0.95
     # Twice the size, twice the error.
-    double = ModelError(apart.pairs, apart.moved, 2.0)
+    double = ModelError(apart.pairs, apart.moved, 2.0, 2.0)
     np.testing.assert_allclose(double.deviation("velocity_m_s", np.zeros((0, *SHAPE, 3))), 2 * std, rtol=1e-6)
 
 

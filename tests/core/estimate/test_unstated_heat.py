@@ -7,11 +7,18 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.estimate.diagnostics import suspicion, undetermined
+from core.estimate.diagnostics import missing_heat, suspicion, undetermined
 from core.estimate.forward_runs import differences
 from core.estimate.prior import room_prior
 from core.estimate.temperature_nudging import free_vertices
-from core.estimate.unstated_heat import adjoin, floor_strips, with_heaters
+from core.estimate.unstated_heat import (
+    Suspect,
+    adjoin,
+    floor_strips,
+    matched,
+    with_heaters,
+    with_suspected_heat,
+)
 from core.problem import Problem
 from core.room.boundary_conditions import boundary
 from core.room.forward import room
@@ -42,6 +49,35 @@ def test_strips_half_way_between_adjoin_one_another_only():
     np.testing.assert_allclose(edges, [(0.4 * n + 0.2, 0.4 * n + 0.6) for n in range(4)])
     assert [adjoin(between[1], other) for other in between] == [True, False, True, False]
     assert not any(adjoin(between[1], other) for other in found)
+
+
+@pytest.mark.parametrize("strength", [0.2, 5.0])
+def test_a_plume_is_known_by_its_shape_however_strong_it_was_tried(strength: float):
+    rng = np.random.default_rng(2)
+    plume, noise = rng.normal(size=400), np.full(400, 1e-4)
+    left = 0.5 * plume + 0.1 * rng.normal(size=400)
+
+    likeness, scale = matched(left, strength * plume, noise)
+    other, _ = matched(left, strength * rng.normal(size=400), noise)
+
+    # Too strong, it would leave more than nothing does.
+    assert strength < 1.0 or np.linalg.norm(left - strength * plume) > np.linalg.norm(left)
+    assert likeness > 0.95
+    assert scale * strength == pytest.approx(0.5, abs=0.02)
+    assert abs(other) < 0.2
+
+
+def test_the_suspect_enters_the_fit_with_its_neighbours():
+    given = problem(stated=False)
+    suspect = Suspect(0.6, 20.0, floor_strips(given)[2])
+
+    added = [b for b in with_suspected_heat(given, suspect).scene.boundary if isinstance(b, Heater)]
+
+    air_k = suspect.strip.temperature_k
+    assert [b.temperature_k - air_k for b in added] == pytest.approx([20.0, 0.0, 0.0])
+    assert [b.patch.lower_m[0] for b in added] == pytest.approx([0.8, 0.4, 1.2])
+    assert {b.temperature_std_k for b in added} == {10.0}
+    assert "x = 0.8 to 1.2 m" in missing_heat(suspect.strip, suspect.likeness)
 
 
 def test_a_strip_is_left_out_where_another_patch_lies():
