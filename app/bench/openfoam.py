@@ -64,8 +64,8 @@ def rows(volume: RoomVolume, cells: int) -> Iterable[dict[str, Any]]:
         counts = room(scene, cells, closure_name(scene)).grid.cells
         write_case(case, scene, counts, _EVERY, _MOST)
         for command in (["blockMesh"], ["topoSet"], ["createPatch", "-overwrite"]):
-            _run(command, case, variables)
-        log = _run([SOLVER], case, variables)
+            run_foam(command, case, variables)
+        log = run_foam([SOLVER], case, variables)
         spent = {
             int(step): float(cpu_s)
             for step, cpu_s in re.findall(r"^Time = (\d+)$.*?^ExecutionTime = ([\d.]+) s", log, re.M | re.S)
@@ -110,7 +110,8 @@ def environment() -> dict[str, str]:
     return here
 
 
-def _run(command: list[str], case: Path, variables: dict[str, str]) -> str:
+def run_foam(command: list[str], case: Path, variables: dict[str, str]) -> str:
+    """What one of OpenFOAM's programs printed. Raises BadInputError where it fails."""
     done = subprocess.run(command, cwd=case, env=variables, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         last = "\n".join((done.stdout + done.stderr).strip().splitlines()[-12:])

@@ -117,7 +117,7 @@ ROOMS = {
 def marched(name: str, what: Made) -> tuple[dict[str, Any], dict[str, Any]]:
     """The room's arrays and a row about how it was made."""
     began_s = time.process_time()
-    volume = _empty(name, what)
+    volume = empty(name, what)
     scene = room_scene(volume, RigOptions(), "surveyed")
     coarse, fine = (room(scene, n, what.closure) for n in (32, what.cells))
     parameters = room_prior(Problem(scene, (), ()), coarse.layout).mean
@@ -145,7 +145,7 @@ def marched(name: str, what: Made) -> tuple[dict[str, Any], dict[str, Any]]:
     return _arrays(what, volume, fine, model, last.mean), row
 
 
-def _empty(name: str, what: Made) -> RoomVolume:
+def empty(name: str, what: Made) -> RoomVolume:
     """Still air on the room's vertices, with the case described."""
     x0, x1, y0, y1, z0, z1 = what.domain
     axes = [np.linspace(a, b, n) for a, b, n in zip((x0, y0, z0), (x1, y1, z1), what.vertices, strict=True)]
@@ -182,7 +182,7 @@ def _empty(name: str, what: Made) -> RoomVolume:
 
 
 def _arrays(what: Made, volume: RoomVolume, fine: Room, model: RoomModel, flow: Any) -> dict[str, Any]:
-    """The volume's arrays, named as in the format."""
+    """The volume's arrays, of a flow on its cells."""
     field = room_fields(flow, model, fine.layout, what.vertices)
     nut = np.asarray(model.viscosity(flow).cells_m2_s) - NU
     for a in AXES:
@@ -192,9 +192,25 @@ def _arrays(what: Made, volume: RoomVolume, fine: Room, model: RoomModel, flow: 
             0,
             a,
         )
-    t, p, u = T0_K + field.excess_k, field.pressure_m2_s2, field.velocity_m_s
+    kelvin = T0_K + field.excess_k
+    return arrays_of(
+        what, volume, kelvin, field.pressure_m2_s2, field.velocity_m_s, nut, f"airlens {what.closure}"
+    )
+
+
+def arrays_of(
+    what: Made,
+    volume: RoomVolume,
+    temperature_k: np.ndarray,
+    pressure_m2_s2: np.ndarray,
+    velocity_m_s: np.ndarray,
+    nut_m2_s: np.ndarray,
+    solver: str,
+) -> dict[str, Any]:
+    """The volume's arrays, named as in the format; fields are on its vertices."""
     inlets = what.inlets
-    arrays = {"x": volume.x_m, "y": volume.y_m, "z": volume.z_m, "T": t, "p": p, "u": u, "nut": nut}
+    arrays = {"x": volume.x_m, "y": volume.y_m, "z": volume.z_m}
+    arrays |= {"T": temperature_k, "p": pressure_m2_s2, "u": velocity_m_s, "nut": nut_m2_s}
     arrays |= {f"bc_{k}": arrays[k][0] for k in ("T", "p", "u", "nut")}
     arrays = {k: np.asarray(v, np.float32) for k, v in arrays.items()}
     arrays |= {
@@ -207,7 +223,7 @@ def _arrays(what: Made, volume: RoomVolume, fine: Room, model: RoomModel, flow: 
     }
     numbers = {"T0": T0_K, "rho0": 1.2041, "G": 2.26e-4, "beta": 1.0 / T0_K, "nu": NU, "Pr": PRANDTL}
     arrays |= {k: np.float64(v) for k, v in (numbers | {"Prt": 0.85, "g": 9.81}).items()}
-    arrays["meta_json"] = np.array(json.dumps({"case": volume.case, "solver": f"airlens {what.closure}"}))
+    arrays["meta_json"] = np.array(json.dumps({"case": volume.case, "solver": solver}))
     return arrays
 
 

@@ -3,10 +3,11 @@
 One to three supplies and an outlet on x_min, 0.05 to 1 m/s, -10 to +10 K, boxes of 2.4 to 8 m, walls adiabatic or of
 their own temperature, and in half of the rooms a heated panel of the floor, which half of these operators state. The
 truth is marched by `core.room` under k-epsilon with other constants, or under the zero-equation closure, on a finer
-grid; entries are misread as far as their deviations say. Rooms of even number are for choosing anything, those of odd
+grid; or it is computed by OpenFOAM under its k-epsilon, RNG k-epsilon or k-omega SST (`--by openfoam`). Entries are
+misread as far as their deviations say. Rooms of even number are for choosing anything, those of odd
 number for figures; from 1000 on they are for nobody to look at.
 
-    python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32]
+    python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32] [--by openfoam]
     python -m tests.benchmarks.random_rooms FOLDER --summary
 
 Volumes and rows stay in FOLDER; a room that has its row is not fitted again.
@@ -28,6 +29,7 @@ from app.volume.scene import heater_of
 from core.metrics import inner
 from core.problem import Problem
 from core.solve.room import RoomSettings
+from tests.benchmarks.foam_rooms import MODELS, computed
 from tests.benchmarks.other_rooms import T0_K, Made, marched
 
 _SEED = 2611
@@ -99,13 +101,20 @@ def _heater(draw: np.random.Generator, domain: tuple[float, ...]) -> dict[str, A
     }
 
 
-def row_of(folder: Path, number: int, cells: int) -> dict[str, Any]:
-    """Make the room if it is not there, fit it, and say how far off the result is and what it says of itself."""
+def made(folder: Path, number: int, by: str) -> Path:
+    """The room's volume, computed if it is not there; a file of JSON beside it says how."""
     path, what = folder / f"room{number}.npz", drawn(number)
     if not path.exists():
-        arrays, made = marched(f"room{number}", what)
-        (folder / f"room{number}.json").write_text(json.dumps(made))
+        model = MODELS[number // 2 % len(MODELS)]
+        arrays, row = computed(path.stem, what, model) if by == "openfoam" else marched(path.stem, what)
+        path.with_suffix(".json").write_text(json.dumps(row))
         np.savez_compressed(path, **arrays)
+    return path
+
+
+def row_of(folder: Path, number: int, cells: int, by: str) -> dict[str, Any]:
+    """Make the room if it is not there, fit it, and say how far off the result is and what it says of itself."""
+    path, what = made(folder, number, by), drawn(number)
     problem, volume = problem_of(path, "operator", "texture", "paper", number)
     stated = what.heater is not None and number % 4 >= 2
     problem = _entered(problem, number, heater_of(read_volume(path)) if stated else None)
@@ -114,7 +123,7 @@ def row_of(folder: Path, number: int, cells: int) -> dict[str, Any]:
     carried_k = inner(volume.temperature_k[:1] - volume.temperature_k)
     return {
         "room": number,
-        "closure": what.closure,
+        "closure": json.loads(path.with_suffix(".json").read_text())["closure"],
         "supplies": len(what.inlets),
         "heater": None if what.heater is None else ("stated" if stated else "not stated"),
         **fit,
@@ -165,6 +174,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--rooms", type=int, default=12, help="every second one from --first")
     parser.add_argument("--cells", type=int, default=32)
+    parser.add_argument("--by", choices=("airlens", "openfoam"), default="airlens")
     parser.add_argument("--summary", action="store_true")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
@@ -176,7 +186,7 @@ def main() -> None:
     for number in range(options.first, options.first + 2 * options.rooms, 2):
         if any(row["room"] == number for row in done):
             continue
-        row = row_of(options.folder, number, options.cells)
+        row = row_of(options.folder, number, options.cells, options.by)
         with rows.open("a") as file:
             file.write(json.dumps(row) + "\n")
         print(json.dumps(row), flush=True)

@@ -12,6 +12,7 @@ from app.errors import BadInputError
 from app.volume.file import read_volume
 from app.volume.sample import SAMPLE_ROOM
 from app.volume.scene import RigOptions, room_scene
+from core.geometry import WallName
 from core.scene import Heater, Inlet, Patch, Wall
 
 CELLS = (6, 5, 4)
@@ -19,6 +20,10 @@ CELLS = (6, 5, 4)
 
 def surveyed():
     return room_scene(read_volume(SAMPLE_ROOM), RigOptions(), "surveyed")
+
+
+def heater_on(wall: WallName) -> Heater:
+    return Heater(patch=Patch(wall=wall, lower_m=(0.1, 0.1), upper_m=(0.3, 0.3)), temperature_k=320.0)
 
 
 def test_the_case_holds_what_the_scene_states(tmp_path: Path):
@@ -38,6 +43,19 @@ def test_the_case_holds_what_the_scene_states(tmp_path: Path):
     )
 
 
+def test_a_heater_on_the_floor_is_a_warm_wall_under_every_model(tmp_path: Path):
+    scene = surveyed()
+    scene = replace(scene, boundary=(*scene.boundary, heater_on("z_min")))
+
+    write_case(tmp_path, scene, CELLS, every=10, most=20, turbulence="kOmegaSST", mean_from=5)
+
+    assert "heater0 { type fixedValue; value uniform 320; }" in (tmp_path / "0" / "T").read_text()
+    assert "name heater0; patchInfo { type wall; }" in (tmp_path / "system" / "createPatchDict").read_text()
+    assert "kOmegaSST" in (tmp_path / "constant" / "turbulenceProperties").read_text()
+    assert "omegaWallFunction" in (tmp_path / "0" / "omega").read_text()
+    assert "timeStart 5" in (tmp_path / "system" / "controlDict").read_text()
+
+
 def test_fields_come_back_with_x_fastest(tmp_path: Path):
     values = np.arange(120).reshape(4, 5, 6)
     words = "\n".join(map(str, values.ravel()))
@@ -55,7 +73,7 @@ def test_fields_come_back_with_x_fastest(tmp_path: Path):
 
 def test_a_room_that_the_case_cannot_hold_is_refused(tmp_path: Path):
     scene = surveyed()
-    warm = Heater(patch=Patch(wall="z_min", lower_m=(0.1, 0.1), upper_m=(0.3, 0.3)), temperature_k=320.0)
+    warm = heater_on("x_max")
     unknown = tuple(part for part in scene.boundary if not isinstance(part, Wall))
 
     with pytest.raises(BadInputError, match="heaters"):

@@ -1,0 +1,116 @@
+"""Rooms as `random_rooms` draws them, computed by OpenFOAM (where it is installed) under one of its three models.
+
+k-epsilon, RNG k-epsilon and k-omega SST by turns; the steady solver from rest, and the mean over its later
+iterations. Not a benchmark by itself: `random_rooms --by openfoam` takes its rooms from here.
+"""
+
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from app.bench.foam_case import SOLVER, Turbulence, read_field, write_case
+from app.bench.openfoam import environment, run_foam
+from app.volume.file import RoomVolume
+from app.volume.scene import RigOptions, room_scene
+from core.geometry import face_of
+from core.known import stated_walls
+from core.room.forward import room
+from core.scene import Heater, Inlet, Outlet, Scene
+from tests.benchmarks.other_rooms import Made, arrays_of, empty
+
+MODELS: tuple[Turbulence, ...] = ("kEpsilon", "RNGkEpsilon", "kOmegaSST")
+# Iterations in all, and from where on their mean is taken.
+_MOST, _MEAN_FROM = 3000, 1500
+
+
+def computed(
+    name: str, what: Made, model: Turbulence, cells: int = 40
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The room's arrays, and a row about how it was made. Raises BadInputError where OpenFOAM fails."""
+    volume = empty(name, what)
+    scene = room_scene(volume, RigOptions(), "surveyed")
+    grid = room(scene, cells, "k_epsilon").grid
+    variables = environment()
+    with tempfile.TemporaryDirectory() as folder:
+        case = Path(folder)
+        write_case(case, scene, grid.cells, _MEAN_FROM // 2, _MOST, model, _MEAN_FROM)
+        for command in (["blockMesh"], ["topoSet"], ["createPatch", "-overwrite"]):
+            run_foam(command, case, variables)
+        log = run_foam([SOLVER], case, variables)
+        means = {
+            n: read_field(case / str(_MOST) / f"{n}Mean", grid.cells) for n in ("U", "T", "p_rgh", "nut")
+        }
+        half = {n: read_field(case / str(_MOST * 3 // 4) / f"{n}Mean", grid.cells) for n in ("U", "T")}
+    spent_s = float(re.findall(r"ExecutionTime = ([\d.]+) s", log)[-1])
+    centres = tuple(grid.centres_m(axis) for axis in range(3))
+    row = {
+        "room": name,
+        "closure": model,
+        "cells": list(grid.cells),
+        "change_k": float(np.sqrt(np.mean((means["T"] - half["T"]) ** 2))),
+        "change_u": float(np.sqrt(np.mean((means["U"] - half["U"]) ** 2) / np.mean(means["U"] ** 2))),
+        "cpu_s": spent_s,
+    }
+    kelvin = _on_walls(means["T"], scene, centres, 0)[..., 0]
+    velocity = _on_walls(means["U"], scene, centres, 1)
+    height_m = np.pad(centres[2], 1, mode="edge")
+    excess_k = kelvin - scene.air.ambient_temperature_k
+    weight = scene.air.expansion_per_k * 9.81 * height_m * excess_k
+    pressure = np.pad(means["p_rgh"][..., 0], 1, mode="edge") + weight
+    nut = np.pad(means["nut"][..., 0], 1, mode="edge")
+    at = _vertices(volume, scene, centres)
+    pressure = at(pressure)
+    return arrays_of(what, volume, at(kelvin), pressure - pressure.mean(), at(velocity), at(nut), model), row
+
+
+def _on_walls(cells: np.ndarray, scene: Scene, centres_m: tuple[np.ndarray, ...], kind: int) -> np.ndarray:
+    """The field with a layer on the walls: T (kind 0) or u (1) of held walls, supplies and heaters, else the next."""
+    wide = np.pad(cells, [(1, 1)] * 3 + [(0, 0)], mode="edge")
+    walls = stated_walls(scene)
+    for name, wall in walls.items():
+        face = face_of(name)
+        plane = (slice(None),) * face.axis + (0 if name.endswith("min") else -1,)
+        if kind == 1:
+            wide[plane] = 0.0
+        elif wall is not None and wall.temperature_k is not None:
+            wide[plane] = wall.temperature_k
+    for part in scene.boundary:
+        if not isinstance(part, Inlet | Outlet | Heater):
+            continue
+        face = face_of(part.patch.wall)
+        side = 0 if part.patch.wall.endswith("min") else -1
+        where: list[Any] = [0, 0, 0]
+        where[face.axis] = side
+        for axis, low, high in zip(face.along, part.patch.lower_m, part.patch.upper_m, strict=True):
+            where[axis] = 1 + np.flatnonzero((centres_m[axis] > low) & (centres_m[axis] < high))
+        rows, columns = face.along
+        index = [None, None, None]
+        index[face.axis] = side
+        index[rows], index[columns] = where[rows][:, None], where[columns][None, :]
+        inside = [(1 if side == 0 else -2) if n == face.axis else i for n, i in enumerate(index)]
+        if isinstance(part, Outlet):
+            wide[tuple(index)] = wide[tuple(inside)]
+        elif kind == 0:
+            wide[tuple(index)] = part.temperature_k
+        elif isinstance(part, Inlet):
+            wide[tuple(index)] = part.velocity_m_s
+    return wide
+
+
+def _vertices(volume: RoomVolume, scene: Scene, centres_m: tuple[np.ndarray, ...]):
+    """Linear interpolation from [wall, centres, wall] to the volume's vertices."""
+    nodes = [
+        np.array([low, *middles, high])
+        for low, high, middles in zip(scene.room.lower_m, scene.room.upper_m, centres_m, strict=True)
+    ]
+    points = np.stack(np.meshgrid(volume.x_m, volume.y_m, volume.z_m, indexing="ij"), -1)
+    lower, upper = (np.array(corner) for corner in (scene.room.lower_m, scene.room.upper_m))
+
+    def at(field: np.ndarray) -> np.ndarray:
+        return RegularGridInterpolator(nodes, field)(np.clip(points, lower, upper))
+
+    return at
