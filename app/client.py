@@ -98,31 +98,36 @@ class Client:
         """List the devices and their states."""
         return self._ask(list[CameraResource | ProjectorResource], "GET", "/devices")
 
-    def camera(self) -> CameraResource:
-        """Return the camera's state."""
-        return self._ask(CameraResource, "GET", "/devices/camera")
+    def camera(self, view: int = 0) -> CameraResource:
+        """Return the state of a view's camera, by the view's number."""
+        return self._ask(CameraResource, "GET", "/devices/camera", query={"view": str(view)})
 
-    def connect_camera(self, experiment: str, air: Literal["still", "moving"] = "still") -> CameraResource:
-        """Connect the camera of an experiment's rig."""
-        return self._ask(
-            CameraResource, "POST", "/devices/camera/connect", {"experiment": experiment, "air": air}
-        )
+    def connect_camera(
+        self, experiment: str, air: Literal["still", "moving"] = "still", view: int = 0
+    ) -> CameraResource:
+        """Connect the camera of a view of an experiment's rig, by the view's number."""
+        body = {"experiment": experiment, "air": air, "view": view}
+        return self._ask(CameraResource, "POST", "/devices/camera/connect", body)
 
     def disconnect_camera(self) -> CameraResource:
-        """Let the camera go."""
+        """Let the cameras go."""
         return self._ask(CameraResource, "POST", "/devices/camera/disconnect")
 
-    def change_camera(self, exposure_s: float | None = None, gain: float | None = None) -> CameraResource:
-        """Set exposure or gain; the answer holds what was granted."""
-        return self._ask(CameraResource, "PATCH", "/devices/camera", {"exposure_s": exposure_s, "gain": gain})
+    def change_camera(
+        self, exposure_s: float | None = None, gain: float | None = None, view: int = 0
+    ) -> CameraResource:
+        """Set exposure or gain of a view's camera; the answer holds what was granted."""
+        body = {"exposure_s": exposure_s, "gain": gain, "view": view}
+        return self._ask(CameraResource, "PATCH", "/devices/camera", body)
 
-    def frame(self, stretch: bool = False) -> bytes:
-        """Return one JPEG of what the camera sees now."""
-        return self._bytes("/devices/camera/frame", {"stretch": "1" if stretch else "0"}).content
+    def frame(self, stretch: bool = False, view: int = 0) -> bytes:
+        """Return one JPEG of what a view's camera sees now."""
+        asked = {"stretch": "1" if stretch else "0", "view": str(view)}
+        return self._bytes("/devices/camera/frame", asked).content
 
-    def shift(self) -> ShiftResource:
-        """Return how far the picture moved since the reference; for the eyes."""
-        return self._ask(ShiftResource, "GET", "/devices/camera/shift")
+    def shift(self, view: int = 0) -> ShiftResource:
+        """Return how far a view's picture moved since the reference; for the eyes."""
+        return self._ask(ShiftResource, "GET", "/devices/camera/shift", query={"view": str(view)})
 
     def projector(self) -> ProjectorResource:
         """Return what the projector said when it was last asked."""

@@ -56,10 +56,12 @@ def run_capture(
     abort: Abort | None = None,
     clock: Clock | None = None,
     rig_on_s: float | None = None,
+    ready: Callable[[], object] | None = None,
 ) -> Burst:
     """Return the burst that `plan` asks for; `burst.outcome` says whether it is whole.
 
-    `on_frame` receives every good frame; `rig_on_s` is how long the rig has been on.
+    `on_frame` receives every good frame; `rig_on_s` is how long the rig has been on. `ready` is called once the
+    camera has settled, and the frames begin when it returns: so several bursts begin together.
     Raises DeviceSettingError when a setting is not granted, DeviceError when not even one frame came.
     """
     clock, stop = clock or SystemClock(), abort or (lambda: False)
@@ -69,6 +71,9 @@ def run_capture(
         wait_until(clock, clock.now_s() + plan.settle_s, stop)
         taker = _Taker(camera, plan, stop)
         settled = _settle(taker, plan)
+        if ready is not None:
+            ready()
+            taker.refresh()
         frames = _take_frames(taker, plan, on_progress, on_frame)
         if not frames.records and taker.lost is not None:
             raise taker.lost
@@ -135,6 +140,10 @@ class _Taker:
         self.refused: Counter[FrameFault] = Counter()
         self.lost: Exception | None = None
         self._camera, self._abort, self._max_refused = camera, abort, plan.max_refused
+        self._fresh = True
+
+    def refresh(self) -> None:
+        """Let the next frame be one whose exposure begins from now on: others may be waiting in the buffers."""
         self._fresh = True
 
     def take(self) -> Frame | None:

@@ -67,7 +67,7 @@ def create_app(config: ServiceConfig) -> FastAPI:
         yield
         services.guide.close()
         services.desk.close()
-        services.camera.close()
+        services.cameras.close()
         services.projector.close()
 
     app = FastAPI(

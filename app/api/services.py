@@ -21,6 +21,7 @@ from app.jobs.news import News
 from app.jobs.state import ACTIVE
 from app.kiosk.screen import KioskScreen
 from app.rig.live_camera import LiveCamera
+from app.rig.live_cameras import LiveCameras
 from app.rig.live_projector import LiveProjector
 
 
@@ -37,11 +38,16 @@ class Services:
     feed: EventFeed
     curves: CurveCache
     solutions: SolutionCache
-    camera: LiveCamera
+    cameras: LiveCameras
     desk: CaptureDesk
     guide: CalibrationDesk
     screen: KioskScreen
     projector: LiveProjector
+
+    @property
+    def camera(self) -> LiveCamera:
+        """The camera of the first view."""
+        return self.cameras.first
 
 
 def create_services(config: ServiceConfig) -> Services:
@@ -56,7 +62,7 @@ def create_services(config: ServiceConfig) -> Services:
     )
     ledger = Ledger(config.jobs_folder)
     news = News(ledger)
-    camera = LiveCamera(news.tell, busy=lambda: bool(ledger.jobs(states=ACTIVE, limit=1)))
+    cameras = LiveCameras(news.tell, busy=lambda: bool(ledger.jobs(states=ACTIVE, limit=1)))
     projector = LiveProjector(news.tell)
     screen = KioskScreen()
     return Services(
@@ -69,9 +75,9 @@ def create_services(config: ServiceConfig) -> Services:
         EventFeed(ledger, news.catch_up),
         CurveCache(ledger),
         SolutionCache(),
-        camera,
-        CaptureDesk(camera, news.tell),
-        CalibrationDesk(camera, screen, news.tell),
+        cameras,
+        CaptureDesk(cameras, news.tell),
+        CalibrationDesk(cameras, screen, news.tell),
         screen,
         projector,
     )

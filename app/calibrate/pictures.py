@@ -85,7 +85,9 @@ class Shooter:
             self._show(np.full((height_px, width_px), level, np.uint8))
 
     def _shoot(self, where: Path, plan: CapturePlan, on_frame: OnFrame) -> Burst:
-        watch = BurstWatch(frame=on_frame, stop=lambda: "keep" if self._abort() else None)
+        watch = BurstWatch(
+            frame=lambda taken, _view: on_frame(taken), stop=lambda: "keep" if self._abort() else None
+        )
         return shoot(self._stage.camera, where, plan, watch)
 
     def _show(self, picture: Picture) -> None:

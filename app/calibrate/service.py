@@ -19,7 +19,7 @@ from app.errors import AirlensError
 from app.experiment.folder import Experiment
 from app.experiment.views import view_number
 from app.rig.conditions import Conditions, conditions_of
-from app.rig.live_camera import LiveCamera
+from app.rig.live_cameras import LiveCameras
 from app.rig.open import open_camera, open_stage, panel_of
 from app.rig.stage import RealStage, Stage, StageTask, UnopenedStage
 from app.states import StateMachine
@@ -83,10 +83,10 @@ class GuideStatus:
 
 
 class CalibrationDesk:
-    """Uses the camera of `live` and the operator's page as `screen`; `tell(kind, body)` hears of progress."""
+    """Uses the cameras of `live` and the operator's page as `screen`; `tell(kind, body)` hears of progress."""
 
     def __init__(
-        self, live: LiveCamera, screen: PatternDisplay, tell: Callable[[str, Mapping[str, Any]], object]
+        self, live: LiveCameras, screen: PatternDisplay, tell: Callable[[str, Mapping[str, Any]], object]
     ) -> None:
         self._live, self._screen, self._tell = live, screen, tell
         self._status = GuideStatus()
@@ -209,17 +209,17 @@ class CalibrationDesk:
     def _stage(self, experiment: Experiment, plan: LivePlan) -> Iterator[Stage]:
         """The rig, its camera also shown to whoever looks."""
         name, view = experiment.folder.name, view_number(experiment, plan.camera)
+        live = self._live.of(view)
         if experiment.settings.rig.camera_kind == "simulated":
             stage = open_stage(experiment, plan.board, view=view)
-            self._live.open(name, lambda: stage.camera, "practice", view)
-            with self._live.using():
+            self._live.open(name, view, lambda: stage.camera, "practice")
+            with live.using():
                 yield stage
             return
-        open_for = (self._live.status.experiment, self._live.view)
-        if open_for != (name, view) or self._live.status.state.value != "ready":
-            self._live.open(name, lambda: open_camera(experiment, "still", view), view=view)
+        if live.status.experiment != name or live.status.state.value != "ready":
+            self._live.open(name, view, lambda: open_camera(experiment, "still", view))
         panel = panel_of(experiment.settings.scene, view)
-        with self._live.using() as camera:
+        with live.using() as camera:
             yield RealStage(camera, None if panel is None else self._screen, panel)
 
     def _progress(self, run: "_Run", done: int, total: int) -> None:

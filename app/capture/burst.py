@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from app.capture.checks import judged
-from app.capture.views import bursts_of_views, together
+from app.capture.views import OpensView, ViewCapture, together
 from app.capture.watched import UNWATCHED, BurstWatch, run_watched
 from app.experiment.folder import Experiment, new_id
 from app.experiment.recorder import CaptureRecorder
 from app.experiment.views import view_names
 from app.files.disk_space import check_room
 from app.rig.conditions import UNTOLD, Conditions, conditions_of, known_pairs, seconds_on
-from app.rig.open import air_of, clock_of
+from app.rig.open import air_of, clock_of, open_camera
 from drivers.burst import Burst, BurstOutcome, CapturePlan
 from drivers.capture import Abort
 from drivers.errors import DeviceSettingError
@@ -29,15 +29,22 @@ from drivers.protocols import Camera
 from drivers.sequence import BurstStart, check_times, evenly, run_sequence
 from drivers.verdict import Verdict
 
+# In the origin of a capture of several views: whether they were taken at once, and how far apart in time.
+CAMERAS = "cameras"
+
 
 @dataclass(frozen=True)
 class Order:
-    """What is asked for: a burst, or several `every_s` from start to start; and what the operator states."""
+    """What is asked for: a burst, or several `every_s` from start to start; and what the operator states.
+
+    `at_once`: the cameras of several views take theirs at the same time, else in turn.
+    """
 
     plan: CapturePlan
     bursts: int = 1
     every_s: float = 0.0
     told: Conditions = UNTOLD
+    at_once: bool = False
 
     def __post_init__(self) -> None:
         if self.bursts < 1 or (self.bursts > 1 and not self.every_s > 0):
@@ -102,14 +109,16 @@ def take(
     known: tuple[Verdict, ...] = (),
     series: Mapping[str, Any] | None = None,
     moment: int | None = None,
+    at_once: bool = False,
+    opens: OpensView | None = None,
 ) -> TakenBurst:
     """Take one burst into a new folder below captures/, by `name` where that was given out already.
 
-    The cameras of further views are opened one after the other once the first has ended, and all pictures are one
-    capture. One that fails is named by `failed`, and what the others took is kept. A raw stack is kept of the first.
-    `moment` is as in `open_camera`; `sequence` says which burst of how many it is; `source` says where the frames
-    come from, where that is not the rig; `known` are verdicts that the frames cannot tell; `series` is its place
-    between two references. Raises AirlensError without room for it, DeviceError.
+    The cameras of further views, opened by `opens`, take theirs in turn once the first has ended, or `at_once`, and
+    all pictures are one capture. One that fails is named by `failed`, and what the others took is kept. A raw stack
+    is kept of the first. `moment` is as in `open_camera`; `sequence` says which burst of how many it is; `source`
+    says where the frames come from, where that is not the rig; `known` are verdicts that the frames cannot tell;
+    `series` is its place between two references. Raises AirlensError without room for it, DeviceError.
     """
     check_room(experiment.folder, plan, camera.info)
     name = name or new_id(experiment.captures_folder, plan.role)
@@ -121,7 +130,9 @@ def take(
         origin |= {} if sequence is None else {"sequence": sequence}
         origin |= {} if series is None else {"series": dict(series)}
         if source is None and len(experiment.settings.scene.views) > 1:
-            return _take_views(camera, experiment, plan, told, watch, recorder, origin, moment)
+            opens = opens or (lambda view: open_camera(experiment, air_of(plan.role), view, moment))
+            cameras = ViewCapture(experiment, camera, opens, plan, told, watch, recorder.observe)
+            return _take_views(cameras, recorder, origin, at_once)
         burst = run_watched(camera, plan, watch, recorder.observe, seconds_on(experiment.settings, told))
         if burst.outcome is BurstOutcome.ABORTED and watch.stop() == "discard":
             recorder.discard()
@@ -134,26 +145,21 @@ def take(
 
 
 def _take_views(
-    camera: Camera,
-    experiment: Experiment,
-    plan: CapturePlan,
-    told: Conditions,
-    watch: BurstWatch,
-    recorder: CaptureRecorder,
-    origin: Mapping[str, Any],
-    moment: int | None,
+    cameras: ViewCapture, recorder: CaptureRecorder, origin: Mapping[str, Any], at_once: bool
 ) -> TakenBurst:
     """The bursts of all views as one capture. Raises what the first camera raised where none took a frame."""
+    experiment, watch = cameras.experiment, cameras.watch
     names = view_names(experiment)
-    found = bursts_of_views(camera, experiment, plan, told, watch, recorder.observe, moment)
+    found = cameras.at_once() if at_once else cameras.in_turn()
     if not found.bursts:
         raise found.errors[0]
     burst = together(found.bursts, names)
     if burst.outcome is BurstOutcome.ABORTED and watch.stop() == "discard":
         recorder.discard()
         return TakenBurst(burst, None)
-    bursts = {number: judged(experiment, one, told, number) for number, one in found.bursts.items()}
-    recorder.keep_views(bursts, names, origin)
+    bursts = {number: judged(experiment, one, cameras.told, number) for number, one in found.bursts.items()}
+    together_s = {"at_once": at_once} | ({} if found.apart_s is None else {"apart_s": found.apart_s})
+    recorder.keep_views(bursts, names, {**origin, CAMERAS: together_s})
     return TakenBurst(together(bursts, names), recorder.folder, found.failed)
 
 
@@ -163,8 +169,9 @@ def take_order(
     order: Order,
     watch: BurstWatch = UNWATCHED,
     name: str | None = None,
+    opens: OpensView | None = None,
 ) -> list[TakenBurst]:
-    """Take every burst of an order, the first by `name`; fewer when it is stopped.
+    """Take every burst of an order, the first by `name`; fewer when it is stopped. `opens` is as in `take`.
 
     Raises DeviceSettingError for times that cannot be kept.
     """
@@ -178,7 +185,19 @@ def take_order(
         if order.bursts > 1:
             sequence = {"id": name} | asdict(start) | {"bursts": order.bursts, "every_s": order.every_s}
         own = name if start.number == 0 else None
-        taken.append(take(camera, experiment, order.plan, order.told, watch, sequence=sequence, name=own))
+        taken.append(
+            take(
+                camera,
+                experiment,
+                order.plan,
+                order.told,
+                watch,
+                sequence=sequence,
+                name=own,
+                at_once=order.at_once,
+                opens=opens,
+            )
+        )
         return taken[-1].burst
 
     run_sequence(starts_s, one, abort=lambda: watch.stop() is not None, clock=clock_of(camera))

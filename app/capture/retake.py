@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from app.capture.burst import TakenBurst, origin_of
+from app.capture.burst import CAMERAS, TakenBurst, origin_of
 from app.capture.checks import judged
 from app.capture.watched import UNWATCHED, BurstWatch, run_watched
 from app.errors import BadInputError
@@ -71,6 +71,7 @@ def retake(
             carry_over(parts, folder, number)
         burst = judged(experiment, burst, told, number)
         origin = dict(parts.origin) or origin_of(experiment, plan)
+        origin.pop(CAMERAS, None)  # taken alone, at another time
         if whole:
             origin["retaken"] = {"view": parts.names[number], "of": parts.folder.name}
         missing = recorder.keep_views({number: burst}, parts.names, origin)

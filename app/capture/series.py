@@ -41,11 +41,12 @@ def take_series(
     told: Conditions = UNTOLD,
     watch: BurstWatch = _UNWATCHED,
     ready: Callable[[CaptureRole, int], object] = lambda role, place: None,
+    at_once: bool = False,
 ) -> Series:
     """Take the three bursts; `settle_s` is waited before the flow, and before the second reference.
 
-    `ready` is called before each burst, when the operator may change the air. Raises AirlensError for a burst that is
-    not whole: what was taken stays.
+    `ready` is called before each burst, when the operator may change the air; `at_once` is as in `take`. Raises
+    AirlensError for a burst that is not whole: what was taken stays.
     """
     name = new_id(experiment.captures_folder, "series")
     taken: list[TakenBurst] = []
@@ -55,7 +56,8 @@ def take_series(
         own = replace(plan, role=role, settle_s=wait_s)
         with opens(role, place) as camera:
             where = {"id": name, "place": place, "began_s": time.time()}
-            taken.append(take(camera, experiment, own, told, watch, series=where, moment=place))
+            one = take(camera, experiment, own, told, watch, series=where, moment=place, at_once=at_once)
+            taken.append(one)
         if taken[-1].shortfall:
             raise AirlensError(f"The series ended with its burst {place + 1} of 3. {taken[-1].shortfall}")
     found = between_references(newest_pair(experiment), known_of(experiment).scene)

@@ -8,7 +8,8 @@ A capture is on record (its folder) before it is said to run: so a kill leaves i
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -16,12 +17,13 @@ from typing import Any
 
 from app.capture.burst import Order, TakenBurst, take_order
 from app.capture.retake import name_of_retake, place_of, retake, to_retake
+from app.capture.views import OpensView
 from app.capture.watched import BurstWatch, OnAbort
 from app.errors import AirlensError
 from app.experiment.folder import Experiment, new_id
 from app.experiment.recorder import release, reserve
 from app.rig.conditions import Conditions
-from app.rig.live_camera import LiveCamera
+from app.rig.live_cameras import LiveCameras
 from app.rig.open import AirState, air_of, open_camera
 from app.states import StateMachine
 from drivers.burst import BurstOutcome, CapturePlan, Progress
@@ -98,13 +100,14 @@ class DeskStatus:
 class _Run:
     """One order that is carried out; `stop` says what becomes of the frames once it is to end.
 
-    `takes` takes it with the camera of `view`, whose simulated mount stands at `moment`, and says how it ended.
+    `takes` takes it with the camera of `view`, whose simulated mount stands at `moment`, and with those of further
+    views, and says how it ended.
     """
 
     experiment: Experiment
     plan: CapturePlan
     name: str
-    takes: Callable[[Camera, BurstWatch], tuple[CaptureEvent, str]]
+    takes: Callable[[Camera, BurstWatch, OpensView], tuple[CaptureEvent, str]]
     view: int = 0
     moment: int | None = None
     stop: OnAbort | None = None
@@ -112,14 +115,14 @@ class _Run:
 
 
 class CaptureDesk:
-    """Takes captures with the camera of `live`; `tell(kind, body)` hears of state and progress, and never raises.
+    """Takes captures with the cameras of `live`; `tell(kind, body)` hears of state and progress, and never raises.
 
     `opener` opens the camera of an experiment's view.
     """
 
     def __init__(
         self,
-        live: LiveCamera,
+        live: LiveCameras,
         tell: Callable[[str, Mapping[str, Any]], object],
         opener: Callable[[Experiment, AirState, int, int | None], Camera] = open_camera,
     ) -> None:
@@ -145,8 +148,8 @@ class CaptureDesk:
             name = new_id(experiment.captures_folder, plan.role)
             reserve(experiment.captures_folder / name, plan)
 
-            def takes(camera: Camera, watch: BurstWatch) -> tuple[CaptureEvent, str]:
-                return _ending(order, take_order(camera, experiment, order, watch, name))
+            def takes(camera: Camera, watch: BurstWatch, opens: OpensView) -> tuple[CaptureEvent, str]:
+                return _ending(order, take_order(camera, experiment, order, watch, name, opens))
 
             return self._begin(state, _Run(experiment, plan, name, takes), order.bursts)
 
@@ -162,7 +165,7 @@ class CaptureDesk:
             if name != capture:
                 reserve(experiment.captures_folder / name, plan)
 
-            def takes(camera: Camera, watch: BurstWatch) -> tuple[CaptureEvent, str]:
+            def takes(camera: Camera, watch: BurstWatch, opens: OpensView) -> tuple[CaptureEvent, str]:
                 taken = retake(camera, experiment, parts, number, told, watch, name)
                 return _ending(Order(plan), [taken])
 
@@ -228,13 +231,12 @@ class CaptureDesk:
     def _take(self, run: _Run) -> tuple[CaptureEvent, str]:
         watch = BurstWatch(
             self._following(run, self._progress),
-            lambda taken: self._live.show(taken.frame),
+            lambda taken, view: self._live.of(run.view or view).show(taken.frame),
             lambda: run.stop,
             self._following(run, self._begun),
         )
-        self._connect(run)
-        with self._live.using() as camera:
-            return run.takes(camera, watch)
+        with self._using(run, run.view) as camera:
+            return run.takes(camera, watch, lambda view: self._using(run, view))
 
     def _following(self, run: _Run, act: Callable[[Any], object]) -> Callable[[Any], object]:
         """Let a run that was left behind tell nothing more."""
@@ -256,17 +258,17 @@ class CaptureDesk:
             self._status = replace(self._status, state=state, reason=reason)
         self._tell_status()
 
-    def _connect(self, run: _Run) -> None:
-        """Open the rig's camera unless it is; a simulated room is told what its air does."""
-        source, air = run.experiment.folder.name, air_of(run.plan.role)
+    @contextmanager
+    def _using(self, run: _Run, view: int) -> Iterator[Camera]:
+        """Hold the camera of a view, opened unless it is; a simulated room is told what its air does."""
+        source, air, live = run.experiment.folder.name, air_of(run.plan.role), self._live.of(view)
         simulated = run.experiment.settings.rig.camera_kind == "simulated"
-        open_for = (self._live.status.experiment, self._live.air, self._live.view)
-        wanted = (source, air if simulated else self._live.air, run.view)
-        again = self._live.status.state.value != "ready" or open_for != wanted
+        wanted = (source, air if simulated else live.air)
+        again = live.status.state.value != "ready" or (live.status.experiment, live.air) != wanted
         if again or (simulated and run.moment is not None):
-            self._live.open(
-                source, lambda: self._opener(run.experiment, air, run.view, run.moment), air, run.view
-            )
+            self._live.open(source, view, lambda: self._opener(run.experiment, air, view, run.moment), air)
+        with live.using() as camera:
+            yield camera
 
     def _begun(self, folder: Path) -> None:
         now = self._status

@@ -16,11 +16,11 @@ OnAbort = Literal["keep", "discard"]
 class BurstWatch:
     """Who follows a burst: hears of every frame, and ends it by saying what becomes of the frames so far.
 
-    `begun` hears of the folder of every new capture.
+    `frame` hears of the number of the view that took it as well. `begun` hears of the folder of every new capture.
     """
 
     progress: OnProgress | None = None
-    frame: OnFrame | None = None
+    frame: Callable[[Taken, int], object] | None = None
     stop: Callable[[], OnAbort | None] = lambda: None
     begun: Callable[[Path], object] = lambda folder: None
 
@@ -29,14 +29,23 @@ UNWATCHED = BurstWatch()
 
 
 def run_watched(
-    camera: Camera, plan: CapturePlan, watch: BurstWatch, keep: OnFrame, rig_on_s: float | None
+    camera: Camera,
+    plan: CapturePlan,
+    watch: BurstWatch,
+    keep: OnFrame,
+    rig_on_s: float | None,
+    view: int = 0,
+    ready: Callable[[], object] | None = None,
 ) -> Burst:
-    """Take a burst; `keep` gets every good frame before the watch does. Raises DeviceError."""
+    """Take a burst; `keep` gets every good frame before the watch does; `ready` is as in `run_capture`.
+
+    Raises DeviceError.
+    """
 
     def follow(taken: Taken) -> None:
         keep(taken)
         if watch.frame is not None:
-            watch.frame(taken)
+            watch.frame(taken, view)
 
     return run_capture(
         camera,
@@ -45,4 +54,5 @@ def run_watched(
         on_frame=follow,
         abort=lambda: watch.stop() is not None,
         rig_on_s=rig_on_s,
+        ready=ready,
     )

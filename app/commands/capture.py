@@ -20,6 +20,12 @@ _ROLES: "dict[CaptureRole, str]" = {
     "dark": "Take dark frames: lens covered.",
     "flat": "Take flat frames: an even, bright wall.",
 }
+AtOnce = Annotated[
+    bool, typer.Option("--at-once", help="Several cameras take theirs at the same time; else in turn.")
+]
+OfView = Annotated[
+    str | None, typer.Option(help="Which camera, by its view's name, where there are several.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
@@ -59,6 +65,7 @@ def _command(role: "CaptureRole"):
         minutes_on: Annotated[
             float | None, typer.Option(min=0, help="Minutes that the rig has been on (the lamp's).")
         ] = None,
+        at_once: AtOnce = False,
         on_abort: Annotated[OnAbort, typer.Option(help="After Ctrl-C: the frames so far.")] = "keep",
         as_json: AsJson = False,
     ) -> None:
@@ -70,7 +77,7 @@ def _command(role: "CaptureRole"):
             role, frames, exposure_s, gain, settle_s, settle_frames, max_refused, refresh_hz, raw_stack
         )
         told = Conditions(ambient_temperature_k, minutes_on)
-        _take(experiment, Order(plan, bursts, every_s, told), on_abort, as_json)
+        _take(experiment, Order(plan, bursts, every_s, told, at_once), on_abort, as_json)
 
     return command
 
@@ -169,6 +176,7 @@ def series(
     ask: Annotated[
         bool, typer.Option("--ask/--no-ask", help="Wait for Enter before each burst, to change the air.")
     ] = True,
+    at_once: AtOnce = False,
     as_json: AsJson = False,
 ) -> None:
     """Take reference, flow and reference again, and say how far the camera moved meanwhile."""
@@ -206,6 +214,7 @@ def series(
             (before_flow_s, before_reference_s),
             watch=watch,
             ready=ready,
+            at_once=at_once,
         )
     for one in found.taken:
         typer.echo(json.dumps(_summary(one)) if as_json else said(one))
@@ -216,6 +225,7 @@ def watch(
     experiment: Folder,
     count: Annotated[int, typer.Option(min=0, help="Looks; 0 goes on until Ctrl-C.")] = 0,
     every_s: Annotated[float, typer.Option(min=0.0, help="Pause between looks [s].")] = 0.5,
+    view: OfView = None,
     as_json: AsJson = False,
 ) -> None:
     """Show the shift against the latest reference, live: drift of the border, and what moves inside."""
@@ -227,18 +237,20 @@ def watch(
     from app.capture.burst import interruptible
     from app.experiment.captures import load_capture
     from app.experiment.folder import open_experiment
+    from app.experiment.views import view_number
     from app.rig.open import open_camera
     from drivers.quick_look import quick_look
 
     opened = open_experiment(experiment)
-    reference = load_capture(opened.latest_capture("reference"))
-    with open_camera(opened, "moving") as camera, interruptible() as stopped:
+    number_of_view = view_number(opened, view)
+    reference = load_capture(opened.latest_capture("reference")).images[number_of_view].mean
+    with open_camera(opened, "moving", number_of_view) as camera, interruptible() as stopped:
         for number in itertools.count():
             if stopped() or (count and number >= count):
                 return
             frame = camera.grab()
             image = (frame.pixels / np.float32(frame.full_scale_counts)).astype(np.float32)
-            look = quick_look(reference.images[0].mean, image)
+            look = quick_look(reference, image)
             (columns, rows), inner = look.drift_px, look.largest_px
             if as_json:
                 typer.echo(

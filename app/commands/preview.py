@@ -16,15 +16,21 @@ def preview(
     experiment: Annotated[Path, typer.Argument(help="Experiment folder, whose rig names the camera.")],
     out: Annotated[Path | None, typer.Option(help="Write the picture here (PNG).")] = None,
     exposure_s: Annotated[float | None, typer.Option(help="Exposure time [s] of this picture.")] = None,
+    view: Annotated[
+        str | None, typer.Option(help="Which camera, by its view's name, where there are several.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Take one frame; print its level, contrast, focus and saturation with advice."""
     from app.experiment.folder import open_experiment
+    from app.experiment.views import view_number
     from app.rig.frame_report import judge_frame, write_picture
     from app.rig.open import open_camera
     from drivers.settings import held
 
-    with open_camera(open_experiment(experiment), "still") as camera, held(camera, exposure_s):
+    opened = open_experiment(experiment)
+    number = view_number(opened, view)
+    with open_camera(opened, "still", number) as camera, held(camera, exposure_s):
         frame = camera.grab()
         quality = judge_frame(camera, frame)
         info = camera.info

@@ -96,6 +96,7 @@ class CameraStatus:
     exposure_s: float | None = None
     gain: float | None = None
     reason: str = ""
+    view: int = 0
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ class _Opened:
 
 
 class LiveCamera:
-    """The one camera of a service. `tell(kind, body)` hears of every change of state.
+    """The camera of one view, by its number. `tell(kind, body)` hears of every change of state.
 
     What `set` sets stays when the same rig is opened again, until its experiment.toml names other settings.
     `busy` says whether a job runs on this machine: then the live picture is shown less often.
@@ -128,11 +129,12 @@ class LiveCamera:
         self,
         tell: Callable[[str, Mapping[str, Any]], object],
         busy: Callable[[], bool] = lambda: False,
+        view: int = 0,
     ) -> None:
-        self._tell = tell
+        self._tell, self.view = tell, view
         self._busy, self._asked_s, self._rate_hz = busy, float("-inf"), LONGEST_RATE_HZ
         self._guard = threading.RLock()  # of the fields below, held for moments
-        self._status = CameraStatus(CameraState.closed)
+        self._status = CameraStatus(CameraState.closed, view=view)
         self._told: tuple[CameraState, str] = (CameraState.closed, "")
         self._opened: _Opened | None = None
         self._opener: object = (
@@ -142,7 +144,7 @@ class LiveCamera:
         self._listeners: dict[int, Callable[[LiveFrame], object]] = {}
         self._stretches: dict[int, bool] = {}
         self._wake = threading.Condition()
-        self.air, self.view = "still", 0
+        self.air = "still"
         self.newest: Frame | None = None
         self._number = 0
         self._wishes: dict[str, _Wish] = {}
@@ -152,10 +154,8 @@ class LiveCamera:
         """The present state."""
         return self._status
 
-    def open(
-        self, experiment: str, make: Callable[[], Camera], air: str = "still", view: int = 0
-    ) -> CameraStatus:
-        """Open (or open again) the camera that `make` returns; `air` is what a simulated room does, `view` its view.
+    def open(self, experiment: str, make: Callable[[], Camera], air: str = "still") -> CameraStatus:
+        """Open (or open again) the camera that `make` returns; `air` is what a simulated room does.
 
         Raises DeviceError when it fails, DeviceBusyError while it is being opened or taking a capture.
         """
@@ -163,14 +163,14 @@ class LiveCamera:
             state = CAMERA.after(self._status.state, CameraEvent.connect)
             before, mine = self._opened, object()
             self._opened, self._opener = None, mine
-            self._status = CameraStatus(state, experiment)
+            self._status = CameraStatus(state, experiment, view=self.view)
         self._tell_state()
         self._let_go(before)
-        self.air, self.view, self.newest = air, view, None
+        self.air, self.newest = air, None
         try:
             camera = make()
             told = self._wish_again(camera, experiment)
-            status = replace(_status_of(camera, CameraState.ready, experiment), reason=told)
+            status = replace(self._status_of(camera, experiment), reason=told)
         except Exception as error:
             self._fail(mine, error)
             raise
@@ -206,7 +206,7 @@ class LiveCamera:
             state = CAMERA.after(before.state, event)
             self._opened, self._opener = None, None
             experiment = before.experiment if state is CameraState.failed else None
-            self._status = CameraStatus(state, experiment, reason=reason)
+            self._status = CameraStatus(state, experiment, reason=reason, view=self.view)
         if before != self._status:
             self._tell_state()
         self._let_go(opened, wait_s=5.0 if event is CameraEvent.disconnect else 0.0)
@@ -268,7 +268,7 @@ class LiveCamera:
     def _give_back(self, opened: "_Opened") -> None:
         """Show the camera as ready, with its settings, unless it was lost or left meanwhile."""
         with contextlib.suppress(DeviceError, OSError):
-            opened.status = _status_of(opened.camera, CameraState.ready, self._status.experiment)
+            opened.status = self._status_of(opened.camera, self._status.experiment)
         with self._guard:
             if self._opened is not opened or opened.ended:
                 return
@@ -374,7 +374,7 @@ class LiveCamera:
             if self._opened is not None:
                 self._opened.ended = True
             state = CAMERA.after(self._status.state, CameraEvent.lose)
-            self._status = CameraStatus(state, self._status.experiment, reason=str(error))
+            self._status = CameraStatus(state, self._status.experiment, reason=str(error), view=self.view)
         self._tell_state()
 
     def _tell_state(self) -> None:
@@ -384,19 +384,20 @@ class LiveCamera:
             if news == self._told:
                 return
             self._told = news
-        self._tell("device", {"device": "camera", "state": news[0].value, "reason": news[1]})
+        body = {"device": "camera", "view": self.view, "state": news[0].value, "reason": news[1]}
+        self._tell("device", body)
 
-
-def _status_of(camera: Camera, state: CameraState, experiment: str | None) -> CameraStatus:
-    info = camera.info
-    return CameraStatus(
-        state,
-        experiment,
-        info.name,
-        info.width_px,
-        info.height_px,
-        info.bits,
-        info.frame_rate_hz,
-        camera.exposure_s,
-        camera.gain,
-    )
+    def _status_of(self, camera: Camera, experiment: str | None) -> CameraStatus:
+        info = camera.info
+        return CameraStatus(
+            CameraState.ready,
+            experiment,
+            info.name,
+            info.width_px,
+            info.height_px,
+            info.bits,
+            info.frame_rate_hz,
+            camera.exposure_s,
+            camera.gain,
+            view=self.view,
+        )

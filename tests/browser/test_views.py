@@ -1,4 +1,4 @@
-"""Several cameras on the page: described, changed, and one that failed taken again alone."""
+"""Several cameras on the page: described, changed, seen side by side, taken at once, and one of them again alone."""
 
 import re
 
@@ -6,13 +6,14 @@ import pytest
 from playwright.sync_api import expect
 
 from app.errors import BadInputError
+from app.experiment.captures import load_capture
 from app.rig.open import open_camera
 from tests.browser.conftest import Opens, Station, snapshot
 from tests.browser.test_faults import go_to
 from tests.browser.two_views import VIEWS, two_views
 
 
-def test_a_camera_that_failed_is_taken_alone_from_beside_its_verdict(
+def test_a_camera_that_failed_is_taken_alone_and_all_are_seen_and_taken_at_once(
     station: Station, opens: Opens, monkeypatch: pytest.MonkeyPatch
 ):
     def broken(found, air, view=0, moment=None):
@@ -20,13 +21,13 @@ def test_a_camera_that_failed_is_taken_alone_from_beside_its_verdict(
             raise BadInputError("The second camera does not answer.")
         return open_camera(found, air, view, moment)
 
-    two_views(station)
+    made = two_views(station)
     watched = opens(station.address)
     page = watched.page
     go_to(page, "Capture")
     page.get_by_label("Frames to average").fill("4")
     with monkeypatch.context() as patch:
-        patch.setattr("app.capture.views.open_camera", broken)
+        patch.setattr(station.app.state.services.desk, "_opener", broken)
         page.get_by_role("button", name="Take reference").click()
         expect(page.locator(".desk")).to_contain_text("The second camera does not answer.")
     library = page.locator(".library")
@@ -38,7 +39,24 @@ def test_a_camera_that_failed_is_taken_alone_from_beside_its_verdict(
     expect(library.get_by_role("img")).to_have_count(1)
     library.get_by_role("button", name=f"Take {VIEWS[0]} again").click()
     expect(library.get_by_role("img")).to_have_count(2)
+    # What every camera sees, side by side; and all of them at once.
+    for name in VIEWS:
+        sight = page.get_by_role("figure", name=f"Live picture of {name}", exact=True)
+        expect(sight.locator("canvas")).to_have_attribute("data-frames", re.compile(r"\d+"))
+    page.get_by_label("All cameras at once").check()
+    page.get_by_role("button", name="Take reference").click()
+    expect(library.get_by_role("img")).to_have_count(3)
+    experiment = station.app.state.services.folders.open(made)
+    newest = load_capture(experiment.latest_capture("reference"))
+    assert newest.manifest["origin"]["cameras"]["at_once"] is True
     snapshot(page, "views-retaken")
+    # One that is lost says so in its place, and is connected again there.
+    station.app.state.services.cameras.of(1).give_up("It was unplugged.")
+    lost = page.get_by_role("figure", name=f"Live picture of {VIEWS[1]}", exact=True)
+    expect(lost).to_contain_text("It was unplugged.")
+    snapshot(page, "views-lost")
+    lost.get_by_role("button", name=f"Connect {VIEWS[1]}").click()
+    expect(lost.locator("canvas")).to_have_attribute("data-frames", re.compile(r"\d+"))
     assert watched.complaints == []
 
 

@@ -18,7 +18,7 @@ from app.jobs import JobsConfig, JobSpec, Ledger, Supervisor
 from app.jobs.engines.engine import Launch, ProcessState
 from app.jobs.folder import JobFolder, try_lock
 from app.jobs.news import News
-from app.rig.live_camera import LiveCamera
+from app.rig.live_cameras import LiveCameras
 from core.geometry import Box, Optics
 from core.scene import FixedTexture, Scene, View
 from drivers.burst import CapturePlan
@@ -128,8 +128,11 @@ class World:
     def begin(self) -> None:
         self.ledger = Ledger(self.root / "jobs")
         self.supervisor = Supervisor(self.ledger, CONFIG, self.engine)
-        self.live = LiveCamera(News(self.ledger).tell)
-        self.desk = CaptureDesk(self.live, News(self.ledger).tell, lambda experiment, air: self.camera())
+        cameras = LiveCameras(News(self.ledger).tell)
+        self.live = cameras.first
+        self.desk = CaptureDesk(
+            cameras, News(self.ledger).tell, lambda experiment, air, view, moment: self.camera()
+        )
 
     def again(self) -> None:
         """Both processes were killed: nothing of them is left but what is on the disk."""

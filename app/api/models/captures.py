@@ -32,7 +32,8 @@ class NewCapture(WireModel):
     """A burst, or several: every field by the name that it has on the command line and in the manifest.
 
     `exposure_s` and `gain` hold for this capture; left out, they are the camera's own. `minutes_on` says how
-    long the rig has been on; left out, the projector's lamp tells. So does the scene the temperature.
+    long the rig has been on; left out, the projector's lamp tells. So does the scene the temperature. `at_once`:
+    several cameras take theirs at the same time; else in turn.
     """
 
     role: Role
@@ -48,6 +49,7 @@ class NewCapture(WireModel):
     every_s: float = Field(default=0.0, ge=0, le=86_400)
     ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
     minutes_on: float | None = Field(default=None, ge=0, le=1e6)
+    at_once: bool = False
 
 
 class Retake(WireModel):

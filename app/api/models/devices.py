@@ -8,9 +8,10 @@ from app.api.models.strict import Named, WireModel
 
 
 class CameraResource(WireModel):
-    """The camera; numbers are null until it is open."""
+    """The camera of a view, by its number; numbers are null until it is open."""
 
     device: Literal["camera"] = "camera"
+    view: int
     state: Literal["closed", "opening", "ready", "capturing", "failed"]
     experiment: str | None
     name: str | None
@@ -24,15 +25,17 @@ class CameraResource(WireModel):
 
 
 class OpenCamera(WireModel):
-    """Which rig to connect; `air` is what a simulated room does."""
+    """Which rig to connect, and the camera of which of its views; `air` is what a simulated room does."""
 
     experiment: Named
+    view: int = Field(default=0, ge=0, lt=100)
     air: Literal["still", "moving"] = "still"
 
 
 class CameraChange(WireModel):
-    """What to set; what is left out stays."""
+    """What to set of a view's camera; what is left out stays."""
 
+    view: int = Field(default=0, ge=0, lt=100)
     exposure_s: float | None = Field(default=None, gt=0, le=60)
     gain: float | None = Field(default=None, ge=0, le=1000)
 

@@ -23,47 +23,56 @@ MJPEG = "multipart/x-mixed-replace; boundary=frame"
 JPEG_BODY = body("image/jpeg", "What the camera sees now.")
 MJPEG_BODY = body("multipart/x-mixed-replace", "JPEG after JPEG, without end.")
 FRAME_LIMIT_S = 3.0
+ViewNumber = Annotated[int, Query(ge=0, lt=100, description="Which view's camera, from 0.")]
 Stretch = Annotated[Literal["0", "1"], Query(description="1 stretches the contrast, for the eyes only.")]
 
 
 @router.get("/devices")
 async def list_devices(given: Given) -> list[CameraResource | ProjectorResource]:
-    """List the devices and their states."""
-    return [CameraResource.of(given.camera.status), projector_resource(given.projector.report)]
+    """List the devices and their states: the cameras by their view's number, then the projector."""
+    cameras = [CameraResource.of(one.status) for one in given.cameras.known]
+    return [*cameras, projector_resource(given.projector.report)]
 
 
 @router.get("/devices/camera")
-async def read_camera(given: Given) -> CameraResource:
-    """Return the camera's state and its settings as read back."""
-    return CameraResource.of(given.camera.status)
+async def read_camera(given: Given, view: ViewNumber = 0) -> CameraResource:
+    """Return the state of a view's camera and its settings as read back."""
+    return CameraResource.of(given.cameras.there(view).status)
 
 
 @router.post("/devices/camera/connect")
 def connect_camera(given: Given, wanted: OpenCamera) -> CameraResource:
-    """Connect, or reconnect, the camera of an experiment's rig."""
-    experiment = given.confirmed.check(given.folders.open(wanted.experiment))
-    status = given.camera.open(wanted.experiment, lambda: open_camera(experiment, wanted.air), wanted.air)
+    """Connect, or reconnect, the camera of a view of an experiment's rig."""
+    experiment, view = given.confirmed.check(given.folders.open(wanted.experiment)), wanted.view
+    views = len(experiment.settings.scene.views)
+    if view >= views:
+        raise ApiError("not_found", f"The experiment has {views} views; there is no view {view}.")
+    status = given.cameras.open(
+        wanted.experiment, view, lambda: open_camera(experiment, wanted.air, view), wanted.air
+    )
     return CameraResource.of(status)
 
 
 @router.post("/devices/camera/disconnect")
 def disconnect_camera(given: Given) -> CameraResource:
-    """Let the camera go, for another program."""
-    return CameraResource.of(given.camera.close())
+    """Let the cameras of all views go, for another program."""
+    given.cameras.close()
+    return CameraResource.of(given.camera.status)
 
 
 @router.patch("/devices/camera")
 def change_camera(given: Given, change: CameraChange) -> CameraResource:
-    """Set exposure and gain; the answer holds what the camera granted."""
-    return CameraResource.of(given.camera.set(change.exposure_s, change.gain))
+    """Set exposure and gain of a view's camera; the answer holds what it granted."""
+    return CameraResource.of(given.cameras.there(change.view).set(change.exposure_s, change.gain))
 
 
 @router.get("/devices/camera/frame", response_class=Response, responses=JPEG_BODY)
-async def read_frame(given: Given, stretch: Stretch = "0") -> Response:
-    """Return one JPEG of what the camera sees now, with its numbers in `X-Statistics`."""
-    if given.camera.status.state not in (CameraState.ready, CameraState.capturing):
+async def read_frame(given: Given, stretch: Stretch = "0", view: ViewNumber = 0) -> Response:
+    """Return one JPEG of what a view's camera sees now, with its numbers in `X-Statistics`."""
+    camera = given.cameras.there(view)
+    if camera.status.state not in (CameraState.ready, CameraState.capturing):
         raise ApiError("conflict", "No camera is connected.", "Connect the camera first.")
-    async with Viewer(given.camera, stretch == "1") as viewer:
+    async with Viewer(camera, stretch == "1") as viewer:
         try:
             frame = await asyncio.wait_for(viewer.next_frame(), FRAME_LIMIT_S)
         except TimeoutError:
@@ -76,11 +85,12 @@ async def read_frame(given: Given, stretch: Stretch = "0") -> Response:
 
 
 @router.get("/devices/camera/live.mjpeg", response_class=StreamingResponse, responses=MJPEG_BODY)
-async def stream_mjpeg(given: Given, stretch: Stretch = "0") -> StreamingResponse:
-    """Stream the live picture to a browser without WebSocket."""
+async def stream_mjpeg(given: Given, stretch: Stretch = "0", view: ViewNumber = 0) -> StreamingResponse:
+    """Stream the live picture of a view to a browser without WebSocket."""
+    camera = given.cameras.there(view)
 
     async def parts() -> AsyncIterator[bytes]:
-        async with Viewer(given.camera, stretch == "1") as viewer:
+        async with Viewer(camera, stretch == "1") as viewer:
             while (frame := await viewer.next_frame()) is not None:
                 jpeg = _jpeg(frame, viewer.stretch)
                 yield b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
@@ -90,13 +100,13 @@ async def stream_mjpeg(given: Given, stretch: Stretch = "0") -> StreamingRespons
 
 
 @router.websocket("/devices/camera/live")
-async def live(socket: WebSocket) -> None:
-    """Send the newest frame for every credit: 4 bytes of length, JSON numbers, JPEG.
+async def live(socket: WebSocket, view: ViewNumber = 0) -> None:
+    """Send the newest frame of a view's camera for every credit: 4 bytes of length, JSON numbers, JPEG.
 
     The viewer sends `{"credits": 1, "stretch": false}`; one that is slow skips frames, none is queued.
     """
     await socket.accept()
-    async with Viewer(services_of(socket).camera, credits=0) as viewer:
+    async with Viewer(services_of(socket).cameras.of(view), credits=0) as viewer:
         listening = asyncio.create_task(_listen(socket, viewer))
         try:
             while (frame := await viewer.next_frame()) is not None:

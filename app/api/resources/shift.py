@@ -1,16 +1,19 @@
 """How far the picture moved since the reference, for the eyes: drift of the border, and what the air does."""
 
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 from fastapi import APIRouter
+from jaxtyping import Float32
 
 from app.api.models.shift import ShiftResource
-from app.api.services import Given, Services
+from app.api.resources.devices import ViewNumber
+from app.api.services import Given
 from app.api.wire.problems import ApiError
 from app.experiment.captures import load_capture
 from app.experiment.folder import Experiment, read_manifest
-from app.rig.live_camera import CameraState
+from app.rig.live_camera import CameraState, LiveCamera
 from drivers.protocols import Frame
 from drivers.quick_look import quick_look
 
@@ -18,11 +21,12 @@ router = APIRouter(tags=["devices"])
 
 
 @router.get("/devices/camera/shift")
-def read_shift(given: Given) -> ShiftResource:
-    """Compare one frame of the connected camera with the newest reference of its experiment."""
-    frame, experiment = _frame(given), given.folders.open(given.camera.status.experiment or "")
+def read_shift(given: Given, view: ViewNumber = 0) -> ShiftResource:
+    """Compare one frame of a view's connected camera with the newest reference of its experiment."""
+    camera = given.cameras.there(view)
+    frame, experiment = _frame(camera), given.folders.open(camera.status.experiment or "")
     folder = experiment.latest_capture("reference")
-    reference = load_capture(folder).images[0].mean
+    reference = _image(folder, view)
     seen = frame.pixels.astype(np.float32) / np.float32(frame.full_scale_counts)
     if seen.shape != reference.shape:
         raise ApiError("conflict", "The image has another size than the reference.", "Take a new one.")
@@ -37,12 +41,19 @@ def read_shift(given: Given) -> ShiftResource:
     )
 
 
-def _frame(given: Services) -> Frame:
+def _frame(live: LiveCamera) -> Frame:
     """The frame that is shown, or a fresh one where nobody looks."""
-    if given.camera.status.state is CameraState.capturing and given.camera.newest is not None:
-        return given.camera.newest
-    with given.camera.using(CameraState.ready) as camera:
+    if live.status.state is CameraState.capturing and live.newest is not None:
+        return live.newest
+    with live.using(CameraState.ready) as camera:
         return camera.grab()
+
+
+def _image(reference: Path, view: int) -> Float32[np.ndarray, "rows cols"]:
+    images = load_capture(reference).images
+    if view >= len(images):
+        raise ApiError("conflict", f"The reference has no picture of view {view}.", "Take a new one.")
+    return images[view].mean
 
 
 def _age_s(experiment: Experiment, capture: str) -> float:

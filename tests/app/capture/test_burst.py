@@ -77,7 +77,7 @@ def test_what_fails_before_the_first_frame_leaves_nothing_and_after_it_what_was_
         take(make_camera(), experiment, CapturePlan(frames=4, gain=100.0))
     assert list(experiment.captures_folder.iterdir()) == []
 
-    def full(taken):
+    def full(taken, view):
         if taken.moments.frames == 3:
             raise OSError("No space left on device")
 

@@ -22,6 +22,7 @@ from app.experiment.folder import Experiment, interrupted, new_id
 from app.jobs import Ledger
 from app.jobs.news import News
 from app.rig.live_camera import CAMERA, CameraState, LiveCamera
+from app.rig.live_cameras import LiveCameras
 from drivers.burst import CapturePlan
 from drivers.errors import DeviceBusyError
 from drivers.simulated import SimulatedCamera
@@ -53,7 +54,7 @@ def order(frames: int = 2) -> Order:
 def desk_of(tmp_path: Path, make: Callable[[], SimulatedCamera] | None = None) -> CaptureDesk:
     tell = News(Ledger(tmp_path / "jobs")).tell
     camera = make or (lambda: SimulatedCamera(lambda: VIEW, seed=1))
-    return CaptureDesk(LiveCamera(tell), tell, lambda experiment, air, view, moment: camera())
+    return CaptureDesk(LiveCameras(tell), tell, lambda experiment, air, view, moment: camera())
 
 
 def taken(desk: CaptureDesk, experiment: Experiment) -> DeskState:

@@ -1,5 +1,6 @@
 """An experiment with two views: simulated, captured in turn, and reconstructed by every door's own function."""
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +10,11 @@ import pytest
 from typer.testing import CliRunner
 
 from app.capture.burst import take
+from app.capture.retake import retake, to_retake
 from app.capture.watched import BurstWatch
 from app.cli import create_cli
 from app.errors import BadInputError
+from app.experiment.capture_parts import parts_of
 from app.experiment.captures import load_capture, newest_pair
 from app.experiment.folder import open_experiment
 from app.experiment.rig_settings import V4l2CameraSettings
@@ -19,6 +22,9 @@ from app.files.provenance import sha256
 from app.pipeline import reconstruct
 from app.rig.open import air_of, named_camera, open_camera
 from drivers.burst import CapturePlan
+from drivers.clock import SystemClock
+from drivers.errors import DeviceBusyError
+from drivers.simulated import CameraFault, SimulatedCamera
 from tests.rooms import ROOM, state_grid
 
 
@@ -74,7 +80,7 @@ def without_the_second(monkeypatch):
             raise BadInputError("The second camera does not answer.")
         return open_camera(experiment, air, view, moment)
 
-    monkeypatch.setattr("app.capture.views.open_camera", broken)
+    monkeypatch.setattr("app.capture.burst.open_camera", broken)
 
 
 def run(*arguments):
@@ -178,3 +184,121 @@ def test_walls_that_are_none_are_refused(views, tmp_path):
     assert done.exit_code != 0
     assert isinstance(done.exception, BadInputError)
     assert "expected" in str(done.exception)
+
+
+def test_cameras_at_once_begin_together_and_the_manifest_says_how_far_apart(folder):
+    experiment = open_experiment(folder)
+    # The second camera settles late: its frames are equally bright only from the sixth on.
+    dim = [0.2, 0.5, 0.3, 0.6, 0.4, 0.5]
+    looks: list[int] = []
+
+    def late() -> SimulatedCamera:
+        pictures = {level: np.full((120, 160), level, np.float32) for level in {*dim, 0.55}}
+
+        def view():
+            looks.append(1)
+            return pictures[dim[len(looks)] if len(looks) < len(dim) else 0.55]
+
+        return SimulatedCamera(view, seed=3, clock=SystemClock())
+
+    with SimulatedCamera(lambda: np.full((120, 160), 0.5, np.float32), seed=2, clock=SystemClock()) as first:
+        plan = CapturePlan(frames=10)
+        taken = take(first, experiment, plan, at_once=True, opens=lambda view: late())
+        assert taken.shortfall == ""
+        apart = load_capture(taken.folder).manifest["origin"]["cameras"]
+        assert apart["at_once"] is True
+        in_turn = take(first, experiment, plan, opens=lambda view: late())
+    later = load_capture(in_turn.folder).manifest["origin"]["cameras"]
+    assert later["at_once"] is False
+    # Ten frames at 30 a second last 0.33 s: so far apart are two bursts in turn, and none at once.
+    assert later["apart_s"] > 0.3
+    assert apart["apart_s"] < later["apart_s"]
+    shutil.rmtree(taken.folder)
+    shutil.rmtree(in_turn.folder)
+
+
+@pytest.mark.parametrize("pulled", [0, 1])
+def test_a_camera_that_is_pulled_out_in_the_middle_costs_the_other_nothing(folder, pulled):
+    experiment = open_experiment(folder)
+    picture = np.full((120, 160), 0.5, np.float32)
+
+    def camera(view: int) -> SimulatedCamera:
+        goes = view == pulled
+        return SimulatedCamera(
+            lambda: picture, seed=view, faults=lambda n: CameraFault.UNPLUG if goes and n == 5 else None
+        )
+
+    seen: list[int] = []
+    watch = BurstWatch(frame=lambda taken, view: seen.append(view))
+    with camera(0) as first:
+        taken = take(first, experiment, CapturePlan(frames=8), watch=watch, at_once=True, opens=camera)
+    names = ("camera", "camera at x_max")
+    assert list(taken.failed) == [names[pulled]]
+    assert "device lost after" in taken.shortfall
+    assert set(seen) == {0, 1}
+    kept = parts_of(taken.folder, names)
+    assert kept.missing == (names[pulled],)
+    assert kept.views[1 - pulled]["frames"] == 8
+    assert kept.origin["cameras"]["at_once"] is True
+    # It is plugged in again and taken alone.
+    with camera(2) as again:
+        whole = retake(again, experiment, *to_retake(experiment, taken.folder.name, None))
+    assert whole.shortfall == ""
+    assert load_capture(taken.folder).complete
+    assert "cameras" not in load_capture(taken.folder).manifest["origin"]
+    shutil.rmtree(taken.folder)
+
+
+def test_a_camera_that_cannot_stream_beside_the_first_one_has_its_turn_while_that_rests(folder):
+    experiment = open_experiment(folder)
+    rests: list[bool] = []
+
+    class OnOneLine(SimulatedCamera):
+        def close(self):
+            rests.append(True)
+            super().close()
+
+        def reconnect(self):
+            rests.clear()
+            super().reconnect()
+
+    picture = np.full((120, 160), 0.5, np.float32)
+
+    def opens(view: int) -> SimulatedCamera:
+        if not rests:
+            raise DeviceBusyError("There is not enough bandwidth for this camera.")
+        return SimulatedCamera(lambda: picture, seed=view)
+
+    with OnOneLine(lambda: picture, seed=9) as first:
+        taken = take(first, experiment, CapturePlan(frames=2), opens=opens)
+        assert rests == []
+        assert first.grab().pixels.shape == (120, 160)
+    assert taken.shortfall == ""
+    shutil.rmtree(taken.folder)
+
+
+def test_an_abort_ends_all_cameras_and_keeps_or_discards(folder):
+    experiment = open_experiment(folder)
+    picture = np.full((120, 160), 0.5, np.float32)
+    done: list[int] = []
+    watch = BurstWatch(lambda now: done.append(now.done), stop=lambda: "discard" if len(done) > 5 else None)
+
+    def camera(view: int) -> SimulatedCamera:
+        return SimulatedCamera(lambda: picture, seed=view)
+
+    with camera(0) as first:
+        taken = take(first, experiment, CapturePlan(frames=5000), watch=watch, at_once=True, opens=camera)
+    assert taken.folder is None
+    assert taken.burst.outcome == "aborted"
+
+
+def test_preview_and_watch_look_through_the_camera_that_is_named(folder):
+    seen = run("preview", folder, "--view", "camera at x_max", "--json")
+    assert json.loads(seen.stdout)["camera"] == "simulated camera at x_max"
+    looked = run(
+        "capture", "watch", folder, "--view", "camera at x_max", "--count", 1, "--every-s", 0, "--json"
+    )
+    assert looked.exit_code == 0, looked.output
+    # Moving air over 160 px: far less than a pixel against the reference of the same camera.
+    assert abs(json.loads(looked.stdout)["drift_px"][0]) < 1.0
+    assert "has 2 views" in str(run("preview", folder).exception)

@@ -40,7 +40,8 @@ class Bench {
   connected = $state(false);
   experiments = $state.raw<ExperimentLine[]>([]);
   experiment = $state<string | null>(null);
-  camera = $state.raw<CameraResource | null>(null);
+  /** The cameras by their view's number; `camera` is the first view's. */
+  cameras = $state.raw<CameraResource[]>([]);
   projector = $state.raw<ProjectorResource | null>(null);
   desk = $state.raw<DeskResource | null>(null);
   captures = $state.raw<CaptureResource[]>([]);
@@ -57,6 +58,8 @@ class Bench {
   preset = $state("auto");
   /** Whether each burst of a sequence is solved for as well. */
   everyBurst = $state(true);
+  /** Whether several cameras take their pictures at the same time. */
+  atOnce = $state(false);
   /** What each running job says that it does. */
   stages = $state.raw<Record<string, string>>({});
   /** When a job will end, as it told last: seconds since 1970; null where it does not know. */
@@ -87,6 +90,7 @@ class Bench {
 
   current = $derived(this.experiments.find((one) => one.experiment === this.experiment) ?? null);
   active = $derived(this.jobs.filter((job) => ACTIVE.includes(job.state)));
+  camera = $derived(this.cameras.find((one) => one.view === 0) ?? null);
   /** The camera and the projector, where they are connected for this experiment. */
   ownCamera = $derived(this.camera?.experiment === this.experiment ? this.camera : null);
   ownProjector = $derived(this.projector?.experiment === this.experiment ? this.projector : null);
@@ -154,23 +158,21 @@ class Bench {
   }
 
   async refresh(): Promise<void> {
-    [this.experiments, this.camera, this.projector, this.desk, this.jobs] = await Promise.all([
+    [this.experiments, , this.desk, this.jobs] = await Promise.all([
       ask("GET /experiments", {}),
-      ask("GET /devices/camera", {}),
-      ask("GET /devices/projector", {}),
+      this.refreshDevices(),
       ask("GET /captures/running", {}),
       ask("GET /jobs", {}),
     ]);
     const known = this.experiments.some((one) => one.experiment === this.experiment);
-    if (!known) this.experiment = this.camera.experiment ?? this.experiments[0]?.experiment ?? null;
+    if (!known) this.experiment = this.camera?.experiment ?? this.experiments[0]?.experiment ?? null;
     await this.refreshExperiment();
   }
 
   async refreshDevices(): Promise<void> {
-    [this.camera, this.projector] = await Promise.all([
-      ask("GET /devices/camera", {}),
-      ask("GET /devices/projector", {}),
-    ]);
+    const devices = await ask("GET /devices", {});
+    this.cameras = devices.filter((one): one is CameraResource => one.device === "camera");
+    this.projector = devices.find((one): one is ProjectorResource => one.device === "projector") ?? null;
   }
 
   async refreshExperiment(): Promise<void> {
@@ -235,8 +237,35 @@ class Bench {
     await this.refresh();
   }
 
+  /** Puts what is known of a view's camera in its place. */
+  put(camera: CameraResource): void {
+    this.cameras = [...this.cameras.filter((one) => one.view !== camera.view), camera];
+  }
+
+  /** Connects the cameras of all views, in turn; what is wrong with a further one is told at its picture. */
   async connect(): Promise<void> {
-    this.camera = await ask("POST /devices/camera/connect", {}, { experiment: this.here });
+    await this.connectView(0);
+    for (let view = 1; view < (this.current?.views.length ?? 1); view++) {
+      try {
+        await this.connectView(view);
+      } catch (error) {
+        if (!(error instanceof ProblemError)) throw error;
+        await this.refreshDevices();
+      }
+    }
+  }
+
+  async connectView(view: number): Promise<void> {
+    this.put(await ask("POST /devices/camera/connect", {}, { experiment: this.here, view }));
+  }
+
+  /** The camera of a view of this experiment, and whether it shows something. */
+  cameraOf(view: number): CameraResource | null {
+    return this.cameras.find((one) => one.view === view && one.experiment === this.experiment) ?? null;
+  }
+
+  isOpen(view: number): boolean {
+    return ["ready", "capturing"].includes(this.cameraOf(view)?.state ?? "");
   }
 
   /** The operator's word that the experiment may open the devices that were just shown. */
@@ -248,7 +277,8 @@ class Bench {
   }
 
   async disconnect(): Promise<void> {
-    this.camera = await ask("POST /devices/camera/disconnect", {});
+    await ask("POST /devices/camera/disconnect", {});
+    await this.refreshDevices();
   }
 
   async connectProjector(): Promise<void> {
@@ -265,7 +295,8 @@ class Bench {
   }
 
   async capture(role: NewCapture["role"], frames: number): Promise<void> {
-    this.desk = await ask("POST /experiments/{experiment}/captures", { experiment: this.here }, { role, frames });
+    const wanted = { role, frames, at_once: this.atOnce };
+    this.desk = await ask("POST /experiments/{experiment}/captures", { experiment: this.here }, wanted);
   }
 
   async retake(capture: string, view: string): Promise<void> {

@@ -27,11 +27,12 @@ export class LivePicture {
   constructor(
     private readonly show: (sight: LiveSight) => void,
     private readonly state: (connected: boolean) => void,
+    private readonly view: number,
   ) {}
 
   open(): void {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
-    const socket = new WebSocket(`${scheme}://${location.host}/api/devices/camera/live`);
+    const socket = new WebSocket(`${scheme}://${location.host}/api/devices/camera/live?view=${this.view}`);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.wait_ms = 500;

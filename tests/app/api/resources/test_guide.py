@@ -112,7 +112,7 @@ def test_each_camera_is_guided_by_its_name(airlens: Client, live: Live):
         assert time.monotonic() < until_s
         time.sleep(0.05)
     assert [view.name for view in after.views] == ["view_00.png"]
-    assert airlens.camera().name == "simulated side"
+    assert airlens.camera(view=1).name == "simulated side"
     other = airlens.guide(made, view="camera")
     assert (other.view, other.state, other.views) == ("camera", "idle", [])
     missing = [one.name for one in airlens.calibration(made).items if one.state == "missing"]
