@@ -31,6 +31,7 @@ from app.api.models.events import EventResource
 from app.api.models.experiments import ExperimentLine, ExperimentResource
 from app.api.models.guide import GuideResource, StepText
 from app.api.models.jobs import Curves, JobResource
+from app.api.models.live import LiveResource
 from app.api.models.prints import PrintedResource
 from app.api.models.problem import MEDIA_TYPE, ProblemDetails
 from app.api.models.projector import ProjectorResource, WireLine
@@ -371,6 +372,15 @@ class Client:
     def running_capture(self) -> DeskResource:
         """Return the capture that is being taken, or the last one."""
         return self._ask(DeskResource, "GET", "/captures/running")
+
+    def live(self) -> LiveResource:
+        """Return what is looked at while captures are taken, and what is told of the newest picture of T."""
+        return self._ask(LiveResource, "GET", "/captures/live")
+
+    def live_plane(self) -> Float[np.ndarray, "nx nz"] | None:
+        """Return the newest picture of T in the middle of the room [K], over x and z; None while there is none."""
+        answer = self._bytes("/captures/live/plane")
+        return None if answer.status_code == 204 else _unpack(answer)
 
     def abort_capture(self, discard: bool = False) -> DeskResource:
         """End the running capture within a frame."""

@@ -18,6 +18,7 @@ from app.api.resources import (
     experiments,
     guide,
     jobs,
+    live,
     plans,
     prints,
     projector,
@@ -47,6 +48,7 @@ RESOURCES: tuple[APIRouter, ...] = (
     answers.router,
     calibrations.router,
     guide.router,
+    live.router,
     captures.router,
     plans.router,
     prints.router,
@@ -67,6 +69,7 @@ def create_app(config: ServiceConfig) -> FastAPI:
         yield
         services.guide.close()
         services.desk.close()
+        services.beside.close()
         services.cameras.close()
         services.projector.close()
 

@@ -20,6 +20,7 @@ from app.jobs import Ledger
 from app.jobs.news import News
 from app.jobs.state import ACTIVE
 from app.kiosk.screen import KioskScreen
+from app.live.beside import LiveAir
 from app.rig.live_camera import LiveCamera
 from app.rig.live_cameras import LiveCameras
 from app.rig.live_projector import LiveProjector
@@ -40,6 +41,7 @@ class Services:
     solutions: SolutionCache
     cameras: LiveCameras
     desk: CaptureDesk
+    beside: LiveAir
     guide: CalibrationDesk
     screen: KioskScreen
     projector: LiveProjector
@@ -64,6 +66,7 @@ def create_services(config: ServiceConfig) -> Services:
     news = News(ledger)
     cameras = LiveCameras(news.tell, busy=lambda: bool(ledger.jobs(states=ACTIVE, limit=1)))
     projector = LiveProjector(news.tell)
+    beside = LiveAir(news.tell)
     screen = KioskScreen()
     return Services(
         config,
@@ -76,7 +79,8 @@ def create_services(config: ServiceConfig) -> Services:
         CurveCache(ledger),
         SolutionCache(),
         cameras,
-        CaptureDesk(cameras, news.tell),
+        CaptureDesk(cameras, news.tell, beside=beside),
+        beside,
         CalibrationDesk(cameras, screen, news.tell),
         screen,
         projector,

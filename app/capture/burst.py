@@ -38,6 +38,7 @@ class Order:
     """What is asked for: a burst, or several `every_s` from start to start; and what the operator states.
 
     `at_once`: the cameras of several views take theirs at the same time, else in turn.
+    `live` asks for T of each burst as it comes; the captures are the same without.
     """
 
     plan: CapturePlan
@@ -45,6 +46,7 @@ class Order:
     every_s: float = 0.0
     told: Conditions = UNTOLD
     at_once: bool = False
+    live: bool = False
 
     def __post_init__(self) -> None:
         if self.bursts < 1 or (self.bursts > 1 and not self.every_s > 0):
@@ -198,6 +200,8 @@ def take_order(
                 opens=opens,
             )
         )
+        if taken[-1].folder is not None and not taken[-1].shortfall:
+            watch.kept(taken[-1].folder)
         return taken[-1].burst
 
     run_sequence(starts_s, one, abort=lambda: watch.stop() is not None, clock=clock_of(camera))

@@ -22,6 +22,7 @@ from app.capture.watched import BurstWatch, OnAbort
 from app.errors import AirlensError
 from app.experiment.folder import Experiment, new_id
 from app.experiment.recorder import release, reserve
+from app.live.beside import LiveAir
 from app.rig.conditions import Conditions
 from app.rig.live_cameras import LiveCameras
 from app.rig.open import AirState, air_of, open_camera
@@ -110,6 +111,7 @@ class _Run:
     takes: Callable[[Camera, BurstWatch, OpensView], tuple[CaptureEvent, str]]
     view: int = 0
     moment: int | None = None
+    live: bool = False
     stop: OnAbort | None = None
     thread: threading.Thread | None = None
 
@@ -117,7 +119,7 @@ class _Run:
 class CaptureDesk:
     """Takes captures with the cameras of `live`; `tell(kind, body)` hears of state and progress, and never raises.
 
-    `opener` opens the camera of an experiment's view.
+    `opener` opens the camera of an experiment's view. `beside` looks at the bursts of orders that ask for it.
     """
 
     def __init__(
@@ -125,8 +127,9 @@ class CaptureDesk:
         live: LiveCameras,
         tell: Callable[[str, Mapping[str, Any]], object],
         opener: Callable[[Experiment, AirState, int, int | None], Camera] = open_camera,
+        beside: LiveAir | None = None,
     ) -> None:
-        self._live, self._tell, self._opener = live, tell, opener
+        self._live, self._tell, self._opener, self._beside = live, tell, opener, beside
         self._status = DeskStatus()
         self._lock = threading.RLock()
         self._now: _Run | None = None
@@ -151,7 +154,7 @@ class CaptureDesk:
             def takes(camera: Camera, watch: BurstWatch, opens: OpensView) -> tuple[CaptureEvent, str]:
                 return _ending(order, take_order(camera, experiment, order, watch, name, opens))
 
-            return self._begin(state, _Run(experiment, plan, name, takes), order.bursts)
+            return self._begin(state, _Run(experiment, plan, name, takes, live=order.live), order.bursts)
 
     def retake(self, experiment: Experiment, capture: str, view: str | None, told: Conditions) -> DeskStatus:
         """Take one camera's picture of a capture again, alone, and return at once.
@@ -234,9 +237,21 @@ class CaptureDesk:
             lambda taken, view: self._live.of(run.view or view).show(taken.frame),
             lambda: run.stop,
             self._following(run, self._begun),
+            lambda folder: self._look(run, folder),
         )
+        if self._beside is not None and run.live and run.plan.role == "flow":
+            self._beside.prepare(run.experiment.folder)
         with self._using(run, run.view) as camera:
             return run.takes(camera, watch, lambda view: self._using(run, view))
+
+    def _look(self, run: _Run, folder: Path) -> None:
+        """Let T of a burst be looked at; after a reference, what its bursts will be compared with is made ready."""
+        if self._beside is None or not run.live:
+            return
+        if run.plan.role == "flow":
+            self._beside.look(run.experiment.folder, folder, run.name)
+        elif run.plan.role == "reference":
+            self._beside.prepare(run.experiment.folder)
 
     def _following(self, run: _Run, act: Callable[[Any], object]) -> Callable[[Any], object]:
         """Let a run that was left behind tell nothing more."""

@@ -17,12 +17,14 @@ class BurstWatch:
     """Who follows a burst: hears of every frame, and ends it by saying what becomes of the frames so far.
 
     `frame` hears of the number of the view that took it as well. `begun` hears of the folder of every new capture.
+    `kept` hears of it once its burst is whole on the disk.
     """
 
     progress: OnProgress | None = None
     frame: Callable[[Taken, int], object] | None = None
     stop: Callable[[], OnAbort | None] = lambda: None
     begun: Callable[[Path], object] = lambda folder: None
+    kept: Callable[[Path], object] = lambda folder: None
 
 
 UNWATCHED = BurstWatch()

@@ -66,6 +66,10 @@ def _command(role: "CaptureRole"):
             float | None, typer.Option(min=0, help="Minutes that the rig has been on (the lamp's).")
         ] = None,
         at_once: AtOnce = False,
+        live: Annotated[
+            bool,
+            typer.Option("--live", help="Tell T of each burst of a flow as it comes, on the error stream."),
+        ] = False,
         on_abort: Annotated[OnAbort, typer.Option(help="After Ctrl-C: the frames so far.")] = "keep",
         as_json: AsJson = False,
     ) -> None:
@@ -77,7 +81,7 @@ def _command(role: "CaptureRole"):
             role, frames, exposure_s, gain, settle_s, settle_frames, max_refused, refresh_hz, raw_stack
         )
         told = Conditions(ambient_temperature_k, minutes_on)
-        _take(experiment, Order(plan, bursts, every_s, told, at_once), on_abort, as_json)
+        _take(experiment, Order(plan, bursts, every_s, told, at_once, live), on_abort, as_json)
 
     return command
 
@@ -85,11 +89,13 @@ def _command(role: "CaptureRole"):
 def _take(folder: Path, order, on_abort: OnAbort, as_json: bool) -> None:
     from app.capture.burst import interruptible, take_order
     from app.capture.watched import BurstWatch
+    from app.commands.live import told_live
     from app.experiment.folder import open_experiment
     from app.rig.open import air_of, open_camera
 
     experiment, plan = open_experiment(folder), order.plan
     with (
+        told_live(experiment, order.live and plan.role == "flow") as look,
         open_camera(experiment, air_of(plan.role)) as camera,
         interruptible() as stopped,
         Bar(transient=True) as bar,
@@ -98,6 +104,7 @@ def _take(folder: Path, order, on_abort: OnAbort, as_json: bool) -> None:
         watch = BurstWatch(
             progress=lambda now: bar.update(task, completed=now.done),
             stop=lambda: on_abort if stopped() else None,
+            kept=look,
         )
         taken = take_order(camera, experiment, order, watch)
     for one in taken:

@@ -33,7 +33,8 @@ class NewCapture(WireModel):
 
     `exposure_s` and `gain` hold for this capture; left out, they are the camera's own. `minutes_on` says how
     long the rig has been on; left out, the projector's lamp tells. So does the scene the temperature. `at_once`:
-    several cameras take theirs at the same time; else in turn.
+    several cameras take theirs at the same time; else in turn. With `live` T of each burst of a flow is looked at
+    as it comes.
     """
 
     role: Role
@@ -50,6 +51,7 @@ class NewCapture(WireModel):
     ambient_temperature_k: float | None = Field(default=None, ge=150, le=400)
     minutes_on: float | None = Field(default=None, ge=0, le=1e6)
     at_once: bool = False
+    live: bool = False
 
 
 class Retake(WireModel):

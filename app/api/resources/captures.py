@@ -78,7 +78,7 @@ def order_of(new: NewCapture) -> Order:
     """The same for the camera. Raises DeviceSettingError for several bursts without `every_s`."""
     content = new.model_dump()
     plan = {field.name: content[field.name] for field in fields(CapturePlan)}
-    return Order(CapturePlan(**plan), new.bursts, new.every_s, conditions_in(content), new.at_once)
+    return Order(CapturePlan(**plan), new.bursts, new.every_s, conditions_in(content), new.at_once, new.live)
 
 
 @router.post("/experiments/{experiment}/captures/imported", status_code=201)

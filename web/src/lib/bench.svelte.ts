@@ -67,6 +67,8 @@ class Bench {
   done = $state("");
   /** Grows with everything that is told of a guided calibration. */
   guided = $state(0);
+  /** Grows with everything that is told of T of the bursts. */
+  looked = $state(0);
 
   /** Whether the new experiment is for pictures that another camera took. */
   importing = $state(false);
@@ -294,8 +296,8 @@ class Bench {
     await this.refresh();
   }
 
-  async capture(role: NewCapture["role"], frames: number): Promise<void> {
-    const wanted = { role, frames, at_once: this.atOnce };
+  async capture(role: NewCapture["role"], frames: number, more: Partial<NewCapture> = {}): Promise<void> {
+    const wanted = { role, frames, at_once: this.atOnce, ...more };
     this.desk = await ask("POST /experiments/{experiment}/captures", { experiment: this.here }, wanted);
   }
 
@@ -407,7 +409,7 @@ class Bench {
   private listen(): void {
     const stream = new EventSource(address("GET /events", {}));
     const heard = (message: MessageEvent<string>) => this.hear(JSON.parse(message.data) as EventResource);
-    for (const kind of ["job", "device", "capture", "calibration", "log", "experiment"])
+    for (const kind of ["job", "device", "capture", "calibration", "log", "experiment", "live"])
       stream.addEventListener(kind, heard);
     stream.onopen = () => {
       if (!this.connected) void this.later("all");
@@ -426,6 +428,7 @@ class Bench {
       if (this.desk) this.desk = { ...this.desk, ...(event.body as Partial<DeskResource>) };
       if (event.body["state"] !== "running") void this.later("experiment");
     } else if (event.kind === "device") void this.later("devices");
+    else if (event.kind === "live") this.looked++;
     else if (event.kind === "experiment") void this.later("all");
     else if (event.kind === "calibration") {
       this.guided++;

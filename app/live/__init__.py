@@ -1,0 +1,1 @@
+"""T of each burst as soon as it is on disk, while a series is taken."""
