@@ -175,7 +175,7 @@ class LiveAir:
             plane = self._plane(told["capture"], told["picture"], plane)
         series = self._series.get(told["capture"] or "")
         going_on = same and before.capture is not None and self._series.get(before.capture) == series
-        skipped = told["skipped"] * (told["state"] != "working") + (before.skipped if going_on else 0)
+        skipped = told["skipped"] * (told["state"] == "working") + (before.skipped if going_on else 0)
         state, reason = LiveState(told["state"]), told.get("reason", "")
         return LiveStatus(state, told["experiment"], told["capture"], reason, skipped, plane)
 
