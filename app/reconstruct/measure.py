@@ -19,6 +19,7 @@ from app.reconstruct.short_mean import with_short_mean
 from app.reconstruct.unstated import past_objects
 from app.reconstruct.yardstick import Exposures, Yardstick
 from core.camera_noise import frame_variance, scattered_variance
+from core.defects import without_defects
 from core.displacement import resolve_window_px, window_centres
 from core.drift import Similarity, move_image
 from core.problem import ImagePair, ShiftMeasurement
@@ -66,7 +67,7 @@ def measure(
     shifts, drifts, notes, views = [], [], [], []
     for index, view in enumerate(scene.views):
         shift, drift, note = _measure_view(scene, index, view, captures, standing.covered[index])
-        alone = _alone(scene, index, flow.images[index].mean, shift.window_px)
+        alone = _alone(scene, index, _picture(flow, index), shift.window_px)
         shift, bursts, left_out = burst_shifts(scene, index, captures, shift, alone, watch)
         shift, averaged = with_short_mean(shift, bursts, captures)
         views.append(bursts)
@@ -86,9 +87,14 @@ def measure(
 
 
 def _pair(view: View, index: int, captures: CapturePair, drift: Similarity) -> ImagePair:
-    before, after = captures.reference.images[index], captures.flow.images[index]
+    before, after = (_picture(capture, index) for capture in (captures.reference, captures.flow))
     variance = _variance(captures.reference, index, view) + _variance(captures.flow, index, view)
-    return ImagePair(move_image(before.mean, drift), after.mean, float(variance.mean()))
+    return ImagePair(move_image(before, drift), after, float(variance.mean()))
+
+
+def _picture(capture: Capture, index: int) -> Image:
+    """The mean picture of a view, as the lens drew it."""
+    return without_defects(capture.images[index].mean)
 
 
 def _variance(capture: Capture, index: int, view: View) -> np.ndarray:
@@ -153,7 +159,7 @@ def _alone(scene: Scene, index: int, mean: Image, window_px: int) -> Callable[[C
 
     def measured(burst: Capture) -> ShiftMeasurement:
         variance = uniform_filter(_variance(burst, index, view), 2 * window_px)
-        exposures = Exposures(mean, burst.images[index].mean, variance, window_px)
+        exposures = Exposures(mean, _picture(burst, index), variance, window_px)
         return without_known_drift(exposures, in_room, beyond, mount(view.drift_std_px), marks)[0]
 
     return measured
@@ -178,13 +184,13 @@ def between_references(captures: CapturePair, scene: Scene, index: int = 0) -> A
 
 
 def _exposures(scene: Scene, index: int, first: Capture, second: Capture) -> Exposures:
-    before, after = first.images[index], second.images[index]
     view = scene.views[index]
     variance = _variance(first, index, view) + _variance(second, index, view)
     window_px = resolve_window_px(scene, view)
     # One weight a window: pixel by pixel the darkest would weigh a thousandfold, and with them what the
     # model leaves out there (clipping, aliasing), which biases a drift of 0.1 px by 1 %.
-    return Exposures(before.mean, after.mean, uniform_filter(variance, 2 * window_px), window_px)
+    before, after = (_picture(capture, index) for capture in (first, second))
+    return Exposures(before, after, uniform_filter(variance, 2 * window_px), window_px)
 
 
 def _share(*captures: Capture) -> float:

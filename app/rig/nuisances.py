@@ -4,24 +4,30 @@ Each acts on the picture's luminance, in the order in which light meets it. What
 from the seed and the burst's number: the same burst looks the same again.
 """
 
+from collections.abc import Callable
+
 import numpy as np
-from jaxtyping import Bool, Float32
+from jaxtyping import Bool, Float, Float32
 from scipy import ndimage
 
 from app.experiment.rig_settings import World
 
 Picture = Float32[np.ndarray, "rows cols"]
+# Where points (column, row) of a picture were in the first burst's, before the mount crept.
+Back = Callable[[Float[np.ndarray, "... 2"]], Float[np.ndarray, "... 2"]]
 
 # Luminance of a pixel that is always full.
 _FULL = 1.0
 # Things before the wall: so many, and how far those that move do, as a share of their width.
 _THINGS, _MOVED = 4, 0.2
+# What is drawn beside a thing's own pixels, and how much more of it is painted: a mount creeps by less.
+_RIM_PX, _MORE_PX = 4, 16
 
 
-def spoiled(picture: Picture, world: World, burst: int, seed: int) -> Picture:
-    """The picture as this world shows it in one burst."""
+def spoiled(picture: Picture, world: World, burst: int, seed: int, back: Back = np.asarray) -> Picture:
+    """The picture as this world shows it in one burst; things before the wall move with it as `back` says."""
     own = np.random.default_rng([seed, 101, burst])
-    spoiled = picture if world.covered == 0.0 else _behind_things(picture, world.covered, burst, seed)
+    spoiled = picture if world.covered == 0.0 else _behind_things(picture, world.covered, burst, seed, back)
     spoiled = spoiled * (_light(picture.shape, world, own) * _vignette(picture.shape, world.vignetting))
     shake_px = world.vibration_px * own.uniform(0.5, 1.5)
     blur_px = float(np.hypot(world.blur_px, shake_px))
@@ -41,11 +47,26 @@ def covered(
     return hidden
 
 
-def _behind_things(picture: Picture, share: float, burst: int, seed: int) -> Picture:
+def _behind_things(picture: Picture, share: float, burst: int, seed: int, back: Back) -> Picture:
     hidden = picture.copy()
+    height, width = picture.shape
     for n, (rows, columns) in enumerate(_things(picture.shape, share, burst, seed)):
-        fine = np.random.default_rng([seed, 103, n]).standard_normal(picture[rows, columns].shape)
-        hidden[rows, columns] = np.clip(0.4 + ndimage.gaussian_filter(fine, 2.0), 0.02, 0.9)
+        wide = tuple(
+            slice(max(part.start - _RIM_PX, 0), min(part.stop + _RIM_PX, length))
+            for part, length in ((rows, height), (columns, width))
+        )
+        at_rows, at_columns = np.mgrid[wide].astype(float)
+        was = back(np.stack([at_columns, at_rows], axis=-1))
+        shape = (rows.stop - rows.start + 2 * _MORE_PX, columns.stop - columns.start + 2 * _MORE_PX)
+        fine = np.random.default_rng([seed, 103, n]).standard_normal(shape)
+        paint = np.clip(0.4 + ndimage.gaussian_filter(fine, 2.0), 0.02, 0.9)
+        # A thing goes on below the picture.
+        there = np.zeros(shape)
+        there[_MORE_PX:, _MORE_PX:-_MORE_PX] = 1.0
+        at = [was[..., 1] - (rows.start - _MORE_PX), was[..., 0] - (columns.start - _MORE_PX)]
+        cover = ndimage.map_coordinates(there, at, order=1, mode="nearest")
+        painted = ndimage.map_coordinates(paint, at, order=5, mode="nearest")
+        hidden[wide] = (1.0 - cover) * hidden[wide] + cover * painted
     return hidden
 
 

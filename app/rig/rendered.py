@@ -12,7 +12,7 @@ from app.errors import BadInputError
 from app.experiment.folder import Experiment
 from app.experiment.rig_settings import SimulatedCameraSettings
 from app.rig.beyond_wall import in_frame, in_room, with_marks
-from app.rig.nuisances import spoiled
+from app.rig.nuisances import Back, spoiled
 from app.volume.file import RoomVolume, read_volume
 from app.volume.scene import room_box, room_objects
 from app.volume.snapshots import read_snapshots
@@ -42,7 +42,8 @@ def seen_picture(
     volume = read_volume(experiment.file(settings.room))
     field = None if air == "still" else volume_field(volume, scene)
     picture = _rendered(volume, experiment, settings, scene, field, view)
-    return spoiled(picture, settings.world, steps, settings.seed + VIEWS_APART * view)
+    back = _before_the_mount_crept(experiment, scene, view)
+    return spoiled(picture, settings.world, steps, settings.seed + VIEWS_APART * view, back)
 
 
 def moving_pictures(
@@ -62,7 +63,8 @@ def moving_pictures(
     def picture(index: int) -> Picture:
         field = temperature_field(snapshots.temperature_k[index], scene)
         drawn = _rendered(volume, experiment, settings, scene, field, view)
-        return spoiled(drawn, settings.world, steps, settings.seed + VIEWS_APART * view)
+        back = _before_the_mount_crept(experiment, scene, view)
+        return spoiled(drawn, settings.world, steps, settings.seed + VIEWS_APART * view, back)
 
     return lambda time_s: picture(snapshots.nearest(time_s))
 
@@ -79,6 +81,18 @@ def _mounted(experiment: Experiment, settings: SimulatedCameraSettings, view: in
             settings.seed + step + VIEWS_APART * view,
         )
     return scene
+
+
+def _before_the_mount_crept(experiment: Experiment, scene: Scene, view: int) -> Back:
+    """Where the pixels of this view were before its camera turned, and its lens breathed."""
+    before, now = experiment.settings.scene.views[view].camera, scene.views[view].camera
+    turned = (before.rotation @ now.rotation.T)[:2, :2]
+    grown = np.array(now.focal_px) / np.array(before.focal_px)
+
+    def back(points_px: Float[np.ndarray, "... 2"]) -> Float[np.ndarray, "... 2"]:
+        return np.array(before.principal_px) + (points_px - np.array(now.principal_px)) / grown @ turned.T
+
+    return back
 
 
 def _as_it_is(experiment: Experiment, settings: SimulatedCameraSettings) -> Scene:

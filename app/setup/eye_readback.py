@@ -7,13 +7,13 @@ import numpy as np
 
 from app.experiment.folder import ExperimentSettings
 from app.experiment.rig_settings import CameraSettings, SimulatedCameraSettings
-from app.setup.written import Told
+from app.setup.written import SceneReading
 from core.geometry import Optics
 from core.scene import CheckerPattern, ProjectedPattern, View
 from core.view_frame import turn_to
 
 
-def camera_answer(settings: ExperimentSettings, view: View, told: Told) -> dict[str, Any]:
+def camera_answer(settings: ExperimentSettings, view: View, told: SceneReading) -> dict[str, Any]:
     """The first camera, which looks at y_max."""
     device = settings.rig.camera
     answer = _eye(view, device, told)
@@ -24,7 +24,7 @@ def camera_answer(settings: ExperimentSettings, view: View, told: Told) -> dict[
     return answer
 
 
-def view_answers(settings: ExperimentSettings, told: Told) -> list[dict[str, Any]]:
+def view_answers(settings: ExperimentSettings, told: SceneReading) -> list[dict[str, Any]]:
     """The further cameras, of a scene whose first one is answered as `camera`."""
     rig, scene = settings.rig, settings.scene
     lit, answers = {"y_max"}, []
@@ -45,7 +45,7 @@ def view_answers(settings: ExperimentSettings, told: Told) -> list[dict[str, Any
     return answers
 
 
-def projector_answer(optics: Optics, url: str, told: Told) -> dict[str, Any]:
+def projector_answer(optics: Optics, url: str, told: SceneReading) -> dict[str, Any]:
     """A projector."""
     return {
         "position": told.place(optics.position_m),
@@ -56,7 +56,7 @@ def projector_answer(optics: Optics, url: str, told: Told) -> dict[str, Any]:
     }
 
 
-def _eye(view: View, device: CameraSettings | None, told: Told) -> dict[str, Any]:
+def _eye(view: View, device: CameraSettings | None, told: SceneReading) -> dict[str, Any]:
     optics = view.camera
     if any(optics.rotation_rad) and not _is_straight(turn_to(view.wall).optics(optics)):
         name = "The camera" if view.name == "camera" else view.name

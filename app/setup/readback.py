@@ -14,7 +14,7 @@ from app.experiment.boundary import read_sensor_table
 from app.experiment.folder import Experiment, ExperimentSettings
 from app.setup.answers import MANY
 from app.setup.eye_readback import camera_answer, projector_answer, view_answers
-from app.setup.written import Told, celsius, metres
+from app.setup.written import SceneReading, celsius, metres
 from core.geometry import Vector3, face_of
 from core.objects import RoomObject
 from core.problem import SensorData
@@ -52,7 +52,7 @@ def read_back(experiment: Experiment) -> ReadBack:
 
 def scene_back(settings: ExperimentSettings) -> ReadBack:
     """The same of settings alone, without what files of sensors hold."""
-    told = Told(settings.scene.room.lower_m)
+    told = SceneReading(settings.scene.room.lower_m)
     view = asked_view(settings.scene)
     answers: dict[str, Any] = {
         "title": settings.title,
@@ -94,7 +94,7 @@ def listed_tables(experiment: Experiment) -> frozenset[str]:
 
 def answer_of(box: RoomObject, corner_m: Vector3) -> dict[str, Any]:
     """An object as an answer, its place measured from the room's corner."""
-    return _object(box, Told(corner_m))
+    return _object(box, SceneReading(corner_m))
 
 
 def blows_in(inlet: Inlet) -> float:
@@ -107,7 +107,7 @@ def _kelvin(value_k: float) -> str:
     return f"{max(value_k, _LEAST_STD):.9g} K"
 
 
-def _boundary(scene: Scene, told: Told) -> dict[str, list[dict[str, Any]]]:
+def _boundary(scene: Scene, told: SceneReading) -> dict[str, list[dict[str, Any]]]:
     found: dict[str, list[dict[str, Any]]] = {"supply": [], "outlet": [], "surface": [], "wall": []}
     for part in scene.boundary:
         match part:
@@ -128,7 +128,7 @@ def _boundary(scene: Scene, told: Told) -> dict[str, list[dict[str, Any]]]:
     return found
 
 
-def _supply(inlet: Inlet, number: int, told: Told) -> dict[str, Any]:
+def _supply(inlet: Inlet, number: int, told: SceneReading) -> dict[str, Any]:
     speed_m_s = blows_in(inlet)
     if abs(speed_m_s - math.hypot(*inlet.velocity_m_s)) > 1e-6 * speed_m_s:
         told.unsaid.append(
@@ -144,7 +144,7 @@ def _supply(inlet: Inlet, number: int, told: Told) -> dict[str, Any]:
     }
 
 
-def _opening(patch: Patch, told: Told) -> dict[str, Any]:
+def _opening(patch: Patch, told: SceneReading) -> dict[str, Any]:
     corner = [told.corner_m[axis] for axis in face_of(patch.wall).along]
     return {
         "wall": patch.wall,
@@ -159,7 +159,7 @@ def _reading(part: Inlet | Outlet | Heater | Wall | RoomObject, value_k: float |
     return {"temperature": celsius(value_k), "temperature_deviation": _kelvin(part.temperature_std_k)}
 
 
-def _wall(wall: Wall, told: Told) -> list[dict[str, Any]]:
+def _wall(wall: Wall, told: SceneReading) -> list[dict[str, Any]]:
     if not wall.no_slip:
         told.unsaid.append(f"Air does not stick to the wall {wall.wall}.")
     if wall.thermal == "unknown":
@@ -168,7 +168,7 @@ def _wall(wall: Wall, told: Told) -> list[dict[str, Any]]:
     return [{"wall": wall.wall} | known]
 
 
-def _object(item: RoomObject, told: Told) -> dict[str, Any]:
+def _object(item: RoomObject, told: SceneReading) -> dict[str, Any]:
     middle_m = tuple(0.5 * (low + high) for low, high in zip(item.lower_m, item.upper_m, strict=True))
     answer: dict[str, Any] = {
         "kind": "box",
@@ -192,7 +192,7 @@ def _is_short(table: SensorData) -> bool:
 
 
 def _sensors(experiment: Experiment) -> tuple[dict[str, Any], tuple[str, ...]]:
-    told = Told(experiment.settings.scene.room.lower_m)
+    told = SceneReading(experiment.settings.scene.room.lower_m)
     found: dict[str, list[dict[str, Any]]] = {"thermometer": [], "anemometer": []}
     for file, table in _tables(experiment).items():
         if not _is_short(table):

@@ -8,7 +8,7 @@ _KELVIN = 273.15
 
 
 @dataclass
-class Told:
+class SceneReading:
     """What is being read: the room's corner, and what has been found that no answer says."""
 
     corner_m: Vector3

@@ -1,13 +1,17 @@
 """Each nuisance of a simulated world does what its unit says."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from app.experiment.rig_settings import World
 from app.rig.nuisances import covered, spoiled
-from app.rig.rendered import drifted
+from app.rig.rendered import _before_the_mount_crept, drifted
 from app.volume.file import read_volume
 from app.volume.scene import RigOptions, room_scene
+from core.geometry import Optics
 from drivers.simulated import SensorNoise, SimulatedCamera
 from tests.app.capture.test_series import ROOM
 
@@ -71,6 +75,35 @@ def test_things_cover_the_stated_share_and_every_second_one_moves():
     before, after = (spoiled(plain(), world, burst, 2) for burst in (0, 1))
     assert np.all(before[~first] == 0.5)
     assert np.any(before[first & second] != after[first & second])
+
+
+def test_things_before_the_wall_move_with_the_camera_as_the_picture_does():
+    world, by_px = World(covered=0.1), np.array([0.4, -0.3])
+    still = spoiled(plain(), world, 0, 2)
+    moved = spoiled(plain(), world, 0, 2, lambda points_px: points_px - by_px)
+
+    expected = ndimage.shift(still.astype(float), by_px[::-1], order=5, mode="nearest")
+    inside = ndimage.binary_erosion(covered(SHAPE, world, (0,), 2), iterations=4)
+    # Their edges ring in the expected picture.
+    assert np.abs(moved[inside] - expected[inside]).mean() < 1e-3
+    assert np.abs(still[inside] - expected[inside]).mean() > 0.01
+
+
+def test_a_simulated_camera_s_things_go_where_its_wall_goes():
+    scene = room_scene(read_volume(ROOM), RigOptions(camera_px=(320, 240)), "operator")
+    experiment = SimpleNamespace(settings=SimpleNamespace(scene=scene))
+    crept = drifted(drifted(scene, 0, 0.3, 0.2, seed=1), 0, 0.3, 0.2, seed=2)
+    points_m = np.array([[0.0, 0.5, 0.2], [0.9, 0.5, 0.8], [0.3, 0.5, 1.2]])
+
+    def on_panel(camera: Optics) -> np.ndarray:
+        x, y, z = camera.rotation @ (points_m - np.array(camera.position_m)).T
+        return np.stack([x / z, y / z], axis=-1) * np.array(camera.focal_px) + np.array(camera.principal_px)
+
+    back = _before_the_mount_crept(experiment, crept, 0)  # type: ignore[arg-type]
+
+    before, after = (on_panel(one.views[0].camera) for one in (scene, crept))
+    assert np.abs(after - before).max() > 0.1
+    np.testing.assert_allclose(back(after), before, atol=1e-6)
 
 
 def test_the_focus_moves_the_edge_of_the_picture_by_the_stated_length():

@@ -1,0 +1,56 @@
+"""Defect pixels are found on a bare wall and in a texture, and a texture has none."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from core.defects import defects, without_defects
+
+FINEST_PX = 5.0
+
+
+def textures() -> list[np.ndarray]:
+    rows, columns = np.mgrid[:64, :64].astype(np.float32)
+    wave = 2 * np.pi / FINEST_PX
+    along_diagonals = np.cos(wave * rows / 2**0.5) * np.cos(wave * columns / 2**0.5)
+    crossed = np.cos(wave * rows) + np.cos(wave * columns)
+    drawn = ndimage.gaussian_filter(np.random.default_rng(1).normal(size=(64, 64)), 1.2)
+    return [0.5 + 0.1 * np.asarray(one, np.float32) for one in (along_diagonals, crossed, drawn)]
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_a_texture_as_fine_as_patterns_are_has_no_defect(number: int):
+    image = textures()[number]
+
+    assert not defects(image).any()
+    assert without_defects(image) is image
+
+
+def test_noise_alone_has_hardly_any():
+    noise = np.random.default_rng(0).normal(0.5, 1e-3, (1500, 1500)).astype(np.float32)
+
+    # What is taken for one is replaced by its neighbours' median: as much noise, or less.
+    assert defects(noise).mean() < 1e-4
+
+
+@pytest.mark.parametrize("level", [1.0, 0.0])
+def test_hot_and_dead_pixels_on_a_bare_wall_are_replaced_by_what_is_around(level: float):
+    bare = np.random.default_rng(2).normal(0.3, 1e-3, (80, 90)).astype(np.float32)
+    spoilt = bare.copy()
+    places = (np.array([3, 40, 77]), np.array([5, 60, 88]))
+    spoilt[places] = level
+
+    repaired = without_defects(spoilt)
+
+    assert np.abs(repaired[places] - 0.3).max() < 5e-3
+    untouched = np.ones(bare.shape, bool)
+    untouched[places] = False
+    np.testing.assert_array_equal(repaired[untouched], spoilt[untouched])
+    # What was given is as it was.
+    assert spoilt[3, 5] == level
+
+
+def test_a_picture_without_inner_pixels_is_left_alone():
+    image = np.zeros((2, 9), np.float32)
+
+    assert without_defects(image) is image
