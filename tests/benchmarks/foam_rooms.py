@@ -7,7 +7,7 @@ iterations. Not a benchmark by itself: `random_rooms --by openfoam` takes its ro
 import re
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
@@ -55,8 +55,8 @@ def computed(
         "change_u": float(np.sqrt(np.mean((means["U"] - half["U"]) ** 2) / np.mean(means["U"] ** 2))),
         "cpu_s": spent_s,
     }
-    kelvin = _on_walls(means["T"], scene, centres, 0)[..., 0]
-    velocity = _on_walls(means["U"], scene, centres, 1)
+    kelvin = _on_walls(means["T"], scene, centres, "T")[..., 0]
+    velocity = _on_walls(means["U"], scene, centres, "u")
     height_m = np.pad(centres[2], 1, mode="edge")
     excess_k = kelvin - scene.air.ambient_temperature_k
     weight = scene.air.expansion_per_k * 9.81 * height_m * excess_k
@@ -67,14 +67,16 @@ def computed(
     return arrays_of(what, volume, at(kelvin), pressure - pressure.mean(), at(velocity), at(nut), model), row
 
 
-def _on_walls(cells: np.ndarray, scene: Scene, centres_m: tuple[np.ndarray, ...], kind: int) -> np.ndarray:
-    """The field with a layer on the walls: T (kind 0) or u (1) of held walls, supplies and heaters, else the next."""
+def _on_walls(
+    cells: np.ndarray, scene: Scene, centres_m: tuple[np.ndarray, ...], kind: Literal["T", "u"]
+) -> np.ndarray:
+    """The field with a layer on the walls: what is held or supplied there, else that of the next cell."""
     wide = np.pad(cells, [(1, 1)] * 3 + [(0, 0)], mode="edge")
     walls = stated_walls(scene)
     for name, wall in walls.items():
         face = face_of(name)
         plane = (slice(None),) * face.axis + (0 if name.endswith("min") else -1,)
-        if kind == 1:
+        if kind == "u":
             wide[plane] = 0.0
         elif wall is not None and wall.temperature_k is not None:
             wide[plane] = wall.temperature_k
@@ -82,22 +84,20 @@ def _on_walls(cells: np.ndarray, scene: Scene, centres_m: tuple[np.ndarray, ...]
         if not isinstance(part, Inlet | Outlet | Heater):
             continue
         face = face_of(part.patch.wall)
-        side = 0 if part.patch.wall.endswith("min") else -1
-        where: list[Any] = [0, 0, 0]
-        where[face.axis] = side
-        for axis, low, high in zip(face.along, part.patch.lower_m, part.patch.upper_m, strict=True):
-            where[axis] = 1 + np.flatnonzero((centres_m[axis] > low) & (centres_m[axis] < high))
-        rows, columns = face.along
-        index = [None, None, None]
-        index[face.axis] = side
-        index[rows], index[columns] = where[rows][:, None], where[columns][None, :]
-        inside = [(1 if side == 0 else -2) if n == face.axis else i for n, i in enumerate(index)]
+        planes = np.moveaxis(wide, face.axis, 0)
+        on_wall, beside = (planes[0], planes[1]) if face.end == 0 else (planes[-1], planes[-2])
+        covered = np.ix_(
+            *(
+                1 + np.flatnonzero((centres_m[axis] > low) & (centres_m[axis] < high))
+                for axis, low, high in zip(face.along, part.patch.lower_m, part.patch.upper_m, strict=True)
+            )
+        )
         if isinstance(part, Outlet):
-            wide[tuple(index)] = wide[tuple(inside)]
-        elif kind == 0:
-            wide[tuple(index)] = part.temperature_k
+            on_wall[covered] = beside[covered]
+        elif kind == "T":
+            on_wall[covered] = part.temperature_k
         elif isinstance(part, Inlet):
-            wide[tuple(index)] = part.velocity_m_s
+            on_wall[covered] = part.velocity_m_s
     return wide
 
 
