@@ -1,9 +1,10 @@
 """Model selection: is another closure, or a heat source that nobody stated, a better explanation of the images?
 
 Each alternative costs a whole fit. It is tried only where the fitted room leaves much of the images unexplained: for
-a heat source, more than models of the air differ in (`core.estimate.model_error`).
+a heat source, more than it explains, or than models of the air differ in (`core.estimate.model_error`).
 """
 
+from core.estimate.diagnostics import missing
 from core.estimate.explained import explained
 from core.estimate.forward_runs import RoomSettings, other_closure
 from core.estimate.marches import Marches
@@ -25,8 +26,8 @@ def left_over(analysis: Analysis) -> float:
 
 
 def lacks_something(analysis: Analysis) -> bool:
-    """Whether what the room leaves of the images is more than their noise, and than models of the air differ in."""
-    return explained(analysis.data, analysis.best.fields).stands_out and model_error_of(analysis).lacks
+    """Whether a room leaves so much of the images that something must be missing in it."""
+    return missing(explained(analysis.data, analysis.best.fields), model_error_of(analysis))
 
 
 def suspected_heat(

@@ -30,6 +30,11 @@ class Explained(eqx.Module):
         return self.left_px**2 > _NOISE_KNOWN * self.noise_px**2
 
     @property
+    def mostly_left(self) -> bool:
+        """Whether more of the measured power is left than explained."""
+        return self.share_left**2 > 0.5
+
+    @property
     def share_left(self) -> float:
         """Share of the measured signal that is left, 0 to 1 and more."""
         return self.left_px / self.measured_px

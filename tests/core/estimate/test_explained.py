@@ -114,13 +114,16 @@ def test_of_rooms_with_right_entries_one_in_twenty_has_such_a_sentence():
 
 
 @pytest.mark.parametrize(
-    ("noise", "ratio", "doubted"), [(0.1, 8.0, True), (0.1, 2.0, False), (3.0, 8.0, False)]
+    ("noise", "ratio", "found_k", "doubted"),
+    [(0.1, 8.0, 3.0, True), (0.1, 2.0, 3.0, False), (0.1, 2.0, 1.0, True), (3.0, 8.0, 1.0, False)],
 )
-def test_a_room_is_doubted_for_what_is_more_than_noise_and_more_than_models_differ_in(noise, ratio, doubted):
+def test_a_room_is_doubted_for_what_is_more_than_noise_and_more_than_models_differ_in(
+    noise, ratio, found_k, doubted
+):
     data = observations(seen(4.0, noise), VERTICES)
     error = ModelError((), np.zeros((0, 0)), 1.0, ratio)
 
-    said = " ".join(misfit(data, explained(data, room_of(1.0)), error))
+    said = " ".join(misfit(data, explained(data, room_of(found_k)), error))
 
     assert ("cannot explain these images" in said) == doubted
     assert ("no more than their noise" in said) == (noise > 1.0)
