@@ -1,7 +1,7 @@
 """Model selection: is another closure, or a heat source that nobody stated, a better explanation of the images?
 
 Each alternative costs a whole fit. It is tried only where the fitted room leaves much of the images unexplained: for
-a heat source, more than it explains, or than models of the air differ in (`core.estimate.model_error`).
+a heat source, more than half, or than models of the air differ in (`core.estimate.model_error`).
 """
 
 from core.estimate.diagnostics import missing

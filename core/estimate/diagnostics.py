@@ -141,15 +141,15 @@ def misfit(data: Observations, seen: Explained, error: ModelError) -> list[str]:
     if not missing(seen, error):
         return [f"{said}."]
     return [
-        f"{said}, more than {'it explains' if seen.mostly_left else 'models of the air differ in'}.",
+        f"{said}, more than {'half' if seen.half_left else 'models of the air differ in'}.",
         "The stated boundary cannot explain these images. Check inlets, outlets and heaters for something that is "
         "not in the scene; until it is stated, distrust the velocity.",
     ]
 
 
 def missing(seen: Explained, error: ModelError) -> bool:
-    """Whether a room leaves more than the noise, and more than it explains or than models of the air differ in."""
-    return seen.stands_out and (seen.mostly_left or error.lacks)
+    """Whether a room leaves more than the noise, and more than half or than models of the air differ in."""
+    return seen.stands_out and (seen.half_left or error.lacks)
 
 
 def doubtful(share: float) -> list[str]:

@@ -10,6 +10,8 @@ from core.room.vertices import RoomFields
 _UNSEEN_SHARE = 0.3
 # A window's stated variance is right within this share: in simulated labs its errors scatter by 0.9 to 1.2 of it.
 _NOISE_KNOWN = 0.2
+# A room that leaves more than this share lacks something.
+_HALF = 0.5
 
 
 class Explained(eqx.Module):
@@ -30,9 +32,9 @@ class Explained(eqx.Module):
         return self.left_px**2 > _NOISE_KNOWN * self.noise_px**2
 
     @property
-    def mostly_left(self) -> bool:
-        """Whether more of the measured power is left than explained."""
-        return self.share_left**2 > 0.5
+    def half_left(self) -> bool:
+        """Whether more than half of the measured signal is left."""
+        return self.share_left > _HALF
 
     @property
     def share_left(self) -> float:
