@@ -107,8 +107,7 @@ def _left_ratio(
     if not len(left):
         return 1.0
     beyond = max(float(np.mean(left**2) - np.mean(noise)), 0.0)
-    unit = _EACH * float(np.mean(np.sum(apart**2, axis=0)))
-    return float(np.sqrt(beyond / max(unit, float(np.finfo(np.float32).tiny))))
+    return float(np.sqrt(beyond / max(_unit_power(apart), float(np.finfo(np.float32).tiny))))
 
 
 def size_of(
@@ -120,7 +119,7 @@ def size_of(
     if not len(left):
         return 1.0
     independent = len(left) / CORRELATED_DATA
-    power, noise_power, unit = np.mean(left**2), np.mean(noise), _EACH * np.mean(np.sum(apart**2, axis=0))
+    power, noise_power, unit = np.mean(left**2), np.mean(noise), _unit_power(apart)
 
     def unlikely(log_size: float) -> float:
         variance = noise_power + np.exp(2.0 * log_size) * unit
@@ -128,3 +127,8 @@ def size_of(
 
     found = minimize_scalar(unlikely, bounds=(-_FARTHEST, _FARTHEST), method="bounded")
     return float(np.exp(found.x))
+
+
+def _unit_power(apart: Float[np.ndarray, "pairs data"]) -> float:
+    """Mean square of what a model that is as wrong as the pairs differ would leave of a datum."""
+    return _EACH * float(np.mean(np.sum(apart**2, axis=0)))

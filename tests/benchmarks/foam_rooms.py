@@ -10,17 +10,16 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from scipy.interpolate import RegularGridInterpolator
 
 from app.bench.foam_case import SOLVER, Turbulence, read_field, write_case
 from app.bench.openfoam import environment, run_foam
-from app.volume.file import RoomVolume
 from app.volume.scene import RigOptions, room_scene
+from core.air import GRAVITY_M_S2
 from core.geometry import face_of
 from core.known import stated_walls
 from core.room.forward import room
 from core.scene import Heater, Inlet, Outlet, Scene
-from tests.benchmarks.other_rooms import Made, arrays_of, empty
+from tests.benchmarks.other_rooms import Made, arrays_of, empty, on_vertices
 
 MODELS: tuple[Turbulence, ...] = ("kEpsilon", "RNGkEpsilon", "kOmegaSST")
 # Iterations in all, and from where on their mean is taken.
@@ -58,13 +57,13 @@ def computed(
     kelvin = _on_walls(means["T"], scene, centres, "T")[..., 0]
     velocity = _on_walls(means["U"], scene, centres, "u")
     height_m = np.pad(centres[2], 1, mode="edge")
-    excess_k = kelvin - scene.air.ambient_temperature_k
-    weight = scene.air.expansion_per_k * 9.81 * height_m * excess_k
-    pressure = np.pad(means["p_rgh"][..., 0], 1, mode="edge") + weight
-    nut = np.pad(means["nut"][..., 0], 1, mode="edge")
-    at = _vertices(volume, scene, centres)
-    pressure = at(pressure)
-    return arrays_of(what, volume, at(kelvin), pressure - pressure.mean(), at(velocity), at(nut), model), row
+    buoyancy = scene.air.expansion_per_k * (kelvin - scene.air.ambient_temperature_k)
+    pressure, nut = (np.pad(means[name][..., 0], 1, mode="edge") for name in ("p_rgh", "nut"))
+    kelvin, pressure, velocity, nut = (
+        on_vertices(field, grid, what.vertices)
+        for field in (kelvin, pressure + GRAVITY_M_S2 * height_m * buoyancy, velocity, nut)
+    )
+    return arrays_of(what, volume, kelvin, pressure - pressure.mean(), velocity, nut, model), row
 
 
 def _on_walls(
@@ -99,18 +98,3 @@ def _on_walls(
         elif isinstance(part, Inlet):
             on_wall[covered] = part.velocity_m_s
     return wide
-
-
-def _vertices(volume: RoomVolume, scene: Scene, centres_m: tuple[np.ndarray, ...]):
-    """Linear interpolation from [wall, centres, wall] to the volume's vertices."""
-    nodes = [
-        np.array([low, *middles, high])
-        for low, high, middles in zip(scene.room.lower_m, scene.room.upper_m, centres_m, strict=True)
-    ]
-    points = np.stack(np.meshgrid(volume.x_m, volume.y_m, volume.z_m, indexing="ij"), -1)
-    lower, upper = (np.array(corner) for corner in (scene.room.lower_m, scene.room.upper_m))
-
-    def at(field: np.ndarray) -> np.ndarray:
-        return RegularGridInterpolator(nodes, field)(np.clip(points, lower, upper))
-
-    return at

@@ -24,7 +24,7 @@ from core.estimate.prior import room_prior
 from core.problem import Problem
 from core.room.forward import Room, carried_over, room, room_fields
 from core.room.march import MarchSettings, march
-from core.room.room_grid import AXES
+from core.room.room_grid import AXES, RoomGrid
 from core.room.step import RoomModel
 from core.room.vertices import cell_matrix
 
@@ -184,18 +184,20 @@ def empty(name: str, what: Made) -> RoomVolume:
 def _arrays(what: Made, volume: RoomVolume, fine: Room, model: RoomModel, flow: Any) -> dict[str, Any]:
     """The volume's arrays, of a flow on its cells."""
     field = room_fields(flow, model, fine.layout, what.vertices)
-    nut = np.asarray(model.viscosity(flow).cells_m2_s) - NU
-    for a in AXES:
-        edge = [(1, 1) if b == a else (0, 0) for b in AXES]
-        nut = np.moveaxis(
-            np.tensordot(cell_matrix(fine.grid, a, what.vertices[a]), np.pad(nut, edge, mode="edge"), (1, a)),
-            0,
-            a,
-        )
+    nut = np.pad(np.asarray(model.viscosity(flow).cells_m2_s) - NU, 1, mode="edge")
+    nut = on_vertices(nut, fine.grid, what.vertices)
     kelvin = T0_K + field.excess_k
     return arrays_of(
         what, volume, kelvin, field.pressure_m2_s2, field.velocity_m_s, nut, f"airlens {what.closure}"
     )
+
+
+def on_vertices(extended: np.ndarray, grid: RoomGrid, vertices: tuple[int, int, int]) -> np.ndarray:
+    """A field on cells, with a layer on the walls around them, at the room's vertices."""
+    for a in AXES:
+        matrix = cell_matrix(grid, a, vertices[a])
+        extended = np.moveaxis(np.tensordot(matrix, extended, (1, a)), 0, a)
+    return extended
 
 
 def arrays_of(
