@@ -19,19 +19,8 @@ PROJECTOR: Tree = {
     "angle_of_view": "40 deg",
 }
 LENSES = (("angle_of_view", "deg"), ("focal_length", "mm"))
-# What a further camera has of the first one until it is asked.
-_ALIKE = (
-    "kind",
-    "pixel_format",
-    "bits",
-    "width_px",
-    "height_px",
-    "exposure",
-    "frames",
-    "angle_of_view",
-    "focal_length",
-    "pixel_pitch",
-)
+# Of the first camera, what a further one does not have as well until it is asked.
+_OWN = ("device", "distance", "position", "truth")
 
 
 def ask_views(tree: Tree) -> Asked:
@@ -58,7 +47,7 @@ def _fresh(tree: Tree, number: int) -> Tree:
     view: Tree = {"name": f"camera {number + 2}", "wall": "x_max", "pattern_seed": number + 1}
     view["distance"] = first.get("distance", "3 m")
     device = {} if first["kind"] == "simulated" else {"device": f"/dev/video{2 * number + 2}"}
-    return view | device | {name: first[name] for name in _ALIKE if name in first}
+    return view | device | {name: value for name, value in first.items() if name not in _OWN}
 
 
 def _ask_view(tree: Tree, path: Path, name: str) -> Asked:
