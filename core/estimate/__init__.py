@@ -11,5 +11,5 @@ Reading order:
                         ensemble
     the last level      discrepancy, temperature_nudging
     other rooms         unstated_heat, alternatives
-    the result          explained, model_error, uncertainty, posterior, diagnostics
+    the result          image_noise, explained, model_error, uncertainty, posterior, diagnostics
 """

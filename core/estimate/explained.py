@@ -2,14 +2,16 @@
 
 import equinox as eqx
 import numpy as np
+from scipy.stats import norm
 
+from core.estimate.image_noise import images
 from core.estimate.observation import IMAGES, Observations
 from core.room.vertices import RoomFields
 
 # Share left that is assumed where the images do not tell it: there are none, or all that they show may be noise.
 _UNSEEN_SHARE = 0.3
-# A window's stated variance is right within this share: in simulated labs its errors scatter by 0.9 to 1.2 of it.
-_NOISE_KNOWN = 0.2
+# Of pictures that show nothing but noise beside what a room explains, one in twenty is said to show more.
+_FALSE_ALARMS = 0.05
 # A room that leaves more than this share lacks something.
 _HALF = 0.5
 
@@ -18,18 +20,21 @@ class Explained(eqx.Module):
     """Rms shifts [px]: the measured signal, what a room predicts of it, what it leaves, and the noise.
 
     Noise is taken out of the first and of the third. These three hold how well its power is known, so that a picture
-    that shows nothing but noise says nothing against a room.
+    that shows nothing but noise says nothing against a room. `noise_known` is that as a share of the power, one
+    standard deviation.
     """
 
     measured_px: float
     predicted_px: float
     left_px: float
     noise_px: float
+    noise_known: float
 
     @property
     def stands_out(self) -> bool:
-        """Whether what is left is more than the noise may be misjudged by."""
-        return self.left_px**2 > _NOISE_KNOWN * self.noise_px**2
+        """Whether what is left is more than the noise may be misjudged by, in 19 pictures of 20."""
+        beyond = self.left_px**2 / self.noise_px**2
+        return beyond > float(norm.ppf(1.0 - _FALSE_ALARMS)) * self.noise_known
 
     @property
     def half_left(self) -> bool:
@@ -49,24 +54,24 @@ class Explained(eqx.Module):
 
 def explained(data: Observations, fields: RoomFields) -> Explained:
     """What these fields explain of the images; a share of 0.3 is left where there are none."""
-    values, variance, group = data.values()
-    shifts = group == IMAGES
-    if not shifts.any():
-        return Explained(1.0, 1.0, _UNSEEN_SHARE, 1.0)
-    values, predicted, variance = values[shifts], data.predicted(fields)[shifts], variance[shifts]
+    if not data.shifts:
+        return Explained(1.0, 1.0, _UNSEEN_SHARE, 1.0, 1.0)
+    seen = images(data, fields)
+    values, predicted, left, variance = seen.values_px, seen.predicted_px, seen.left_px, seen.variance_px2
     noise = float(variance.sum())
-    # One standard deviation of the noise's power.
-    doubt = float(np.sqrt(2.0 * np.sum(variance**2)))
+    # One standard deviation of the noise's power: of what it happens to be, and of what is known of it.
+    drawn = float(np.sqrt(2.0 * np.sum(variance**2)))
+    doubt = float(np.hypot(drawn, seen.known * noise))
 
     def rms(power: float) -> float:
         return float(np.sqrt(max(power, np.finfo(np.float32).tiny) / len(values)))
 
-    left = values - predicted
     return Explained(
         rms(max(float(values @ values) - noise, 0.0) + doubt),
         rms(float(predicted @ predicted) + doubt),
         rms(max(float(left @ left) - noise, 0.0) + _UNSEEN_SHARE**2 * doubt),
         rms(noise),
+        doubt / noise,
     )
 
 

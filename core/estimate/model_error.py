@@ -26,6 +26,7 @@ from scipy.stats import norm
 from core.data_error import CORRELATED_DATA
 from core.estimate.discrepancy import LENGTH_SHARE
 from core.estimate.forward_runs import Derivatives
+from core.estimate.image_noise import images, unshared
 from core.estimate.least_squares import Posterior
 from core.estimate.observation import IMAGES, Observations
 from core.room.vertices import RoomFields
@@ -83,20 +84,19 @@ def model_error(
 ) -> ModelError:
     """The error of the model that ended in the room `found`."""
     jacobian = derivatives.per_deviation(data.predicted).T
-    shown = [data.predicted(other) - data.predicted(one) for one, other in pairs]
+    between = [data.predicted(other) - data.predicted(one) for one, other in pairs]
     if len(posterior.deviation):
         weighted = jacobian.T / posterior.deviation**2
         normal = weighted @ jacobian + np.eye(len(posterior.vector))
-        moved = np.stack([np.linalg.solve(normal, weighted @ apart) for apart in shown])
+        moved = np.stack([np.linalg.solve(normal, weighted @ apart) for apart in between])
     else:
         moved = np.zeros((len(pairs), len(posterior.vector)))
-    values, noise, group = data.values()
-    images = group == IMAGES
-    left = (values - data.predicted(found))[images]
-    apart = np.stack([s - jacobian @ m for s, m in zip(shown, moved, strict=True)])[:, images]
-    return ModelError(
-        pairs, moved, size_of(left, noise[images], apart), _left_ratio(left, noise[images], apart)
-    )
+    seen = images(data, found)
+    apart = np.stack([s - jacobian @ m for s, m in zip(between, moved, strict=True)])
+    shown = data.values()[2] == IMAGES
+    apart = np.stack([unshared(data, of[shown]) for of in apart])
+    left, noise = seen.left_px, seen.variance_px2
+    return ModelError(pairs, moved, size_of(left, noise, apart), _left_ratio(left, noise, apart))
 
 
 def _left_ratio(

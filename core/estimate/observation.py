@@ -31,10 +31,14 @@ IMAGES, PLANES, SENSORS, OUTLETS = 0, 1, 2, 4
 
 
 class ShiftBlocks(eqx.Module):
-    """Pooled shifts of one view: `row[w]` is the block of window w, or -1 if the window is left out."""
+    """Pooled shifts of one view: `row[w]` is the block of window w, or -1 if the window is left out.
+
+    `cell` is each block's place in the picture, counted in blocks.
+    """
 
     operator: StraightRayOperator
     row: Int[np.ndarray, " windows"]
+    cell: Int[np.ndarray, "blocks 2"]
     weight: Float[np.ndarray, "windows 2 2"]
     displacement_px: Float[np.ndarray, "blocks 2"]
     variance_px2: Float[np.ndarray, "blocks 2"]
@@ -71,13 +75,18 @@ def shift_blocks(
         return None
     key = cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1]
     row = np.full(len(key), -1)
-    row[used] = np.unique(key[used], return_inverse=True)[1]
+    _, one, row[used] = np.unique(key[used], return_index=True, return_inverse=True)
     total = np.zeros((row.max() + 1, 2, 2))
     np.add.at(total, row[used], measured.information_per_px2[used])
     covariance = np.linalg.inv(total)
     weight = np.einsum("wij,wjk->wik", covariance[np.maximum(row, 0)], measured.information_per_px2)
     blocks = ShiftBlocks(
-        operator, row, weight, np.zeros(total.shape[:2]), np.diagonal(covariance, axis1=1, axis2=2).copy()
+        operator,
+        row,
+        cell[used][one],
+        weight,
+        np.zeros(total.shape[:2]),
+        np.diagonal(covariance, axis1=1, axis2=2).copy(),
     )
     errors_px = measured.common_errors_px
     still = None if errors_px is None else _still(blocks, errors_px, nearly_still(measured))

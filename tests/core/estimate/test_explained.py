@@ -25,14 +25,14 @@ def room_of(warmer_k: float) -> RoomFields:
     return RoomFields(warm, np.zeros(VERTICES), np.zeros((*VERTICES, 3)), np.zeros(1))
 
 
-def seen(warmer_k: float, noise: float, seed: int = 0) -> Problem:
+def seen(warmer_k: float, noise: float, seed: int = 0, window_px: int = 16) -> Problem:
     """Pictures of that air with `noise` times its rms shift; the scene is the tests' own."""
     given = problem(stated=True)
     camera = given.scene.views[0].camera
-    across = np.arange(8.0, camera.width_px, 16.0), np.arange(8.0, camera.height_px, 16.0)
+    across = [np.arange(window_px / 2, size_px, window_px) for size_px in (camera.width_px, camera.height_px)]
     centres = np.stack(np.meshgrid(*across), -1).reshape(-1, 2)
     clean = ShiftMeasurement(
-        centres, np.zeros((len(centres), 2)), np.tile(1e8 * np.eye(2), (len(centres), 1, 1)), 16
+        centres, np.zeros((len(centres), 2)), np.tile(1e8 * np.eye(2), (len(centres), 1, 1)), window_px
     )
     operator = observations(Problem(given.scene, (clean,)), VERTICES).shifts[0].operator
     refractivity = given.scene.air.excess_refractivity(jnp.asarray(room_of(warmer_k).excess_k, jnp.float32))
