@@ -1,45 +1,79 @@
 """Pixels of the sensor that show nothing of the scene: hot ones, dead ones.
 
-A lens spreads every point over more than a pixel, so a pixel lies little above or below its eight neighbours: in a
-texture whose finest period is 5 px by at most 1.6 times as far as they lie apart (two such waves along the
-diagonals), in noise hardly ever by more. A defect stands out further. It does not move when the camera does: on a
-bare wall a few of them would tell that the camera stood still.
+A lens spreads every point over more than a pixel, so a pixel follows from those around it: the weights of the best
+linear prediction (Wiener) are those of the picture itself. A defect does not follow, and its neighbours, predicted
+with it, do not either. So a pixel is a defect where it alone makes more than half of all that is unpredicted around
+it. It does not move when the camera does: a few of them tell that the camera stood still, on a bare wall and in
+a texture alike.
+
+Of two defects side by side each predicts the other: they may be missed.
 """
 
 import numpy as np
-from jaxtyping import Bool, Float32
+from jaxtyping import Bool, Float, Float32
+from scipy import ndimage
 
 Image = Float32[np.ndarray, "rows cols"]
 
-# A defect lies further above, or below, all of its neighbours than so many times their range.
-_STANDS_OUT = 3.0
-_NEIGHBOURS = [(row, column) for row in (0, 1, 2) for column in (0, 1, 2) if (row, column) != (1, 1)]
+# A pixel is predicted from those at most so far away in rows and columns: half a period of the finest pattern.
+_REACH = 2
+_AROUND = [(r, c) for r in range(2 * _REACH + 1) for c in range(2 * _REACH + 1) if (r, c) != (_REACH, _REACH)]
+# Pixels that the weights are learned from: a thousand for each weight.
+_LEARNED_FROM = 1000 * len(_AROUND)
+# Pixels across the square in which what is unpredicted is summed: three predictions side by side.
+_SQUARE = 3 * (2 * _REACH + 1)
+_HALF = 0.5
 
 
 def without_defects(image: Image) -> Image:
-    """The picture with each defect replaced by the median of its neighbours; the picture itself if it has none.
+    """The picture with each defect replaced by its prediction; the picture itself if it has none.
 
-    The outermost pixels are left as they are.
+    The two outermost rows and columns of pixels are left as they are.
     """
-    where = np.argwhere(defects(image))
-    if not len(where):
+    if min(image.shape) <= 2 * _REACH:
+        return image
+    weights = _weights(image)
+    inner, predicted = image[_REACH:-_REACH, _REACH:-_REACH], _predicted(image, weights)
+    bad = _stands_alone(inner - predicted, weights)
+    if not bad.any():
         return image
     repaired = image.copy()
-    rows, columns = (where + 1).T
-    around = np.stack([image[rows + r - 1, columns + c - 1] for r, c in _NEIGHBOURS])
-    repaired[rows, columns] = np.median(around, axis=0)
+    repaired[_REACH:-_REACH, _REACH:-_REACH][bad] = predicted[bad]
     return repaired
 
 
-def defects(image: Image) -> Bool[np.ndarray, "inner_rows inner_cols"]:
-    """Which pixels, without the outermost, are defects."""
-    height, width = image.shape
-    if height < 3 or width < 3:
-        return np.zeros((max(height - 2, 0), max(width - 2, 0)), bool)
-    low, high = (np.full((height - 2, width - 2), start, image.dtype) for start in (np.inf, -np.inf))
-    for row, column in _NEIGHBOURS:
-        neighbour = image[row : row + height - 2, column : column + width - 2]
-        np.minimum(low, neighbour, out=low)
-        np.maximum(high, neighbour, out=high)
-    inner, apart = image[1:-1, 1:-1], _STANDS_OUT * (high - low)
-    return (inner - high > apart) | (low - inner > apart)
+def _weights(image: Image) -> Float[np.ndarray, " around"]:
+    """Of each pixel around, by least squares; they sum to 1, so that a bare wall is predicted as well."""
+    rng, inner = np.random.default_rng(0), np.array(image.shape) - 2 * _REACH
+    rows, columns = (rng.integers(0, n, _LEARNED_FROM) for n in inner)
+    around = np.stack([image[rows + r, columns + c] for r, c in _AROUND], axis=1).astype(float)
+    centre, mean = image[rows + _REACH, columns + _REACH].astype(float), around.mean(1)
+    free, *_ = np.linalg.lstsq(around - mean[:, None], centre - mean, rcond=None)
+    return free + (1.0 - free.sum()) / len(free)
+
+
+def _predicted(
+    image: Image, weights: Float[np.ndarray, " around"]
+) -> Float32[np.ndarray, "inner_rows inner_cols"]:
+    rows, columns = (n - 2 * _REACH for n in image.shape)
+    total = np.zeros((rows, columns), np.float32)
+    for (r, c), weight in zip(_AROUND, weights.astype(np.float32), strict=True):
+        total += weight * image[r : r + rows, c : c + columns]
+    return total
+
+
+def _stands_alone(
+    left: Float32[np.ndarray, "rows cols"], weights: Float[np.ndarray, " around"]
+) -> Bool[np.ndarray, "rows cols"]:
+    """Where a pixel, by itself and in the prediction of its neighbours, makes more than half of what is left.
+
+    That is the pixel that is furthest from its prediction; those around it are predicted with it.
+    """
+    size = np.abs(left)
+    around = ndimage.uniform_filter(size, _SQUARE, mode="constant") * _SQUARE**2
+    alone = size * (1.0 + float(np.abs(weights).sum())) > _HALF * around
+    rows, columns = np.nonzero(alone)
+    padded = np.pad(size, _REACH)
+    nearby = [padded[rows + r, columns + c] for r, c in _AROUND]
+    alone[rows, columns] = size[rows, columns] > np.max(nearby, axis=0, initial=0.0)
+    return alone

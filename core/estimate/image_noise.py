@@ -63,6 +63,17 @@ def images(data: Observations, fields: RoomFields) -> Images:
     return Images(values, predicted, variance, doubt**0.5 / max(float(variance.sum()), _TINY))
 
 
+def with_noise_seen(data: Observations, fields: RoomFields) -> Observations:
+    """The data, their images' noise as what these fields leave of them shows."""
+    seen, scaled, start = images(data, fields), [], 0
+    for blocks in data.shifts:
+        own = slice(start, start + blocks.displacement_px.size)
+        variance = seen.variance_px2[own].reshape(-1, 2)
+        scaled.append(eqx.tree_at(lambda of: of.variance_px2, blocks, variance))
+        start = own.stop
+    return eqx.tree_at(lambda of: of.shifts, data, tuple(scaled))
+
+
 def unshared(data: Observations, shifts_px: Float[np.ndarray, " shifts"]) -> Float[np.ndarray, " shifts"]:
     """Shifts of all views without what any size of the errors that windows share would explain of them.
 

@@ -23,6 +23,7 @@ from core.estimate.forward_runs import (
     run_as_stated,
     run_under_other_closure,
 )
+from core.estimate.image_noise import with_noise_seen
 from core.estimate.levenberg_marquardt import fine_search
 from core.estimate.marches import Marches
 from core.estimate.observation import Observations, observations
@@ -126,7 +127,7 @@ def fitted_room(
     """The fit: parameters, then the level of T, and everything that the standard deviations need."""
     coarse, fine, prior = background.coarse, background.fine, background.prior
     vertices = (settings.vertices, settings.vertices, settings.vertices)
-    data = data_of(background, problem, settings)
+    data = with_noise_seen(data_of(background, problem, settings), background.first.fields)
     if settings.use_images and any(motion_hides(shift) for shift in problem.shifts):
         return _by_ensemble(background, data, settings, marches)
     vector, base, linearised = coarse_fit(background, data, settings, marches)

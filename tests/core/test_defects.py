@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from core.defects import defects, without_defects
+from core.defects import without_defects
 
 FINEST_PX = 5.0
 
@@ -22,22 +22,21 @@ def textures() -> list[np.ndarray]:
 def test_a_texture_as_fine_as_patterns_are_has_no_defect(number: int):
     image = textures()[number]
 
-    assert not defects(image).any()
     assert without_defects(image) is image
 
 
 def test_noise_alone_has_hardly_any():
     noise = np.random.default_rng(0).normal(0.5, 1e-3, (1500, 1500)).astype(np.float32)
 
-    # What is taken for one is replaced by its neighbours' median: as much noise, or less.
-    assert defects(noise).mean() < 1e-4
+    # What is taken for one is replaced by its prediction: as much noise, or less.
+    assert (without_defects(noise) != noise).mean() < 1e-4
 
 
 @pytest.mark.parametrize("level", [1.0, 0.0])
 def test_hot_and_dead_pixels_on_a_bare_wall_are_replaced_by_what_is_around(level: float):
     bare = np.random.default_rng(2).normal(0.3, 1e-3, (80, 90)).astype(np.float32)
     spoilt = bare.copy()
-    places = (np.array([3, 40, 77]), np.array([5, 60, 88]))
+    places = (np.array([3, 40, 77]), np.array([5, 60, 87]))
     spoilt[places] = level
 
     repaired = without_defects(spoilt)
@@ -48,6 +47,23 @@ def test_hot_and_dead_pixels_on_a_bare_wall_are_replaced_by_what_is_around(level
     np.testing.assert_array_equal(repaired[untouched], spoilt[untouched])
     # What was given is as it was.
     assert spoilt[3, 5] == level
+
+
+@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize("level", [1.0, 0.0])
+def test_those_in_a_texture_are_as_well(level: float, number: int):
+    image = textures()[number]
+    places = (np.array([5, 40, 60]), np.array([7, 30, 55]))
+    spoilt = image.copy()
+    spoilt[places] = level
+
+    repaired = without_defects(spoilt)
+
+    left = np.abs(repaired - image)
+    assert left.max() < 0.25 * np.abs(spoilt - image)[places].min()
+    untouched = np.ones(image.shape, bool)
+    untouched[places] = False
+    np.testing.assert_array_equal(repaired[untouched], image[untouched])
 
 
 def test_a_picture_without_inner_pixels_is_left_alone():
