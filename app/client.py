@@ -24,7 +24,7 @@ from app.api.models.answers import (
     PortResource,
     TemplateResource,
 )
-from app.api.models.calibrations import CalibrationResource
+from app.api.models.calibrations import CalibrationResource, TogetherResource
 from app.api.models.captures import CaptureResource, DeskResource, Role
 from app.api.models.devices import CameraResource
 from app.api.models.events import EventResource
@@ -257,6 +257,11 @@ class Client:
         """Calibrate a simulated rig."""
         path = f"/experiments/{experiment}/calibration"
         return self._ask(CalibrationResource, "POST", path, {"kind": "simulated"})
+
+    def calibrate_together(self, experiment: str, tape_std_m: float = 0.005) -> TogetherResource:
+        """Adjust several calibrated views together, by what more than one of them saw."""
+        path = f"/experiments/{experiment}/calibration/together"
+        return self._ask(TogetherResource, "POST", path, {"tape_std_m": tape_std_m})
 
     def plan(self, experiment: str) -> Plan:
         """Return the newest plan; a job of kind `plan` makes one."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from app.calibrate.parts import Part, parts_of
+from app.calibrate.parts import Part, parts_of, ties_of
 from app.errors import BadInputError
 from app.experiment.folder import (
     Experiment,
@@ -31,6 +31,7 @@ class Step(StrEnum):
     print_pattern = "print pattern"
     print_board = "print board"
     calibrate = "calibrate"
+    together = "calibrate together"
     reference = "reference"
     flow = "flow"
     reconstruct = "reconstruct"
@@ -48,7 +49,7 @@ class Next:
 
 
 # What a rig can be measured with without.
-ADVISED = frozenset({Step.plan, Step.print_pattern, Step.print_board})
+ADVISED = frozenset({Step.plan, Step.print_pattern, Step.print_board, Step.together})
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def whereabouts(folder: Path, shown: str = "") -> Whereabouts:
         "rig": _rig(experiment),
         "plan": "made" if (experiment.folder / PLAN_FILE).is_file() else "none yet",
         "print": _print(experiment),
-        "calibration": _calibration(parts_of(experiment)),
+        "calibration": _calibration(parts_of(experiment), experiment),
         "captures": _captures(experiment),
         "results": _results(experiment),
     }
@@ -82,7 +83,15 @@ def next_step(experiment: Experiment, shown: str, advised: bool = True) -> Next:
 
     Raises BadInputError for files that cannot be read.
     """
-    rules = (_of_the_rig, _of_the_plan, _of_the_print, _of_the_calibration, _of_the_captures, _of_the_results)
+    rules = (
+        _of_the_rig,
+        _of_the_plan,
+        _of_the_print,
+        _of_the_calibration,
+        _of_the_ties,
+        _of_the_captures,
+        _of_the_results,
+    )
     for rule in rules:
         found = rule(experiment, shown)
         if found is not None and (advised or found.step not in ADVISED):
@@ -147,6 +156,18 @@ def _of_the_calibration(experiment: Experiment, shown: str) -> Next | None:
     return Next(Step.calibrate, command, f"not calibrated yet: {', '.join(missing)}")
 
 
+def _of_the_ties(experiment: Experiment, shown: str) -> Next | None:
+    """Before anything is taken: later, cameras may have moved since their boards."""
+    tied = ties_of(experiment)
+    if tied is None or tied.joint or finished(experiment.captures_folder):
+        return None
+    return Next(
+        Step.together,
+        f"airlens calibrate together {shown}",
+        "each view is calibrated by itself; a board that several cameras see ties them to a millimetre",
+    )
+
+
 def _of_the_captures(experiment: Experiment, shown: str) -> Next | None:
     frames = max(view.frames for view in experiment.settings.scene.views)
     roles = _roles(experiment)
@@ -205,8 +226,9 @@ def _print(experiment: Experiment) -> str:
     return f"{rows * cols} sheets of {printed.paper}, {printed.created[:10]}{state}"
 
 
-def _calibration(parts: tuple[Part, ...]) -> str:
-    return ", ".join(f"{part.step.value} {part.state}" for part in parts)
+def _calibration(parts: tuple[Part, ...], experiment: Experiment) -> str:
+    text, tied = ", ".join(f"{part.step.value} {part.state}" for part in parts), ties_of(experiment)
+    return text if tied is None else f"{text}; {tied.text}"
 
 
 def _captures(experiment: Experiment) -> str:

@@ -153,12 +153,47 @@ class FurtherView:
 
 
 @dataclass(frozen=True)
+class Joint:
+    """Devices of several views that were adjusted together: how they err with one another.
+
+    `parts` names them, cameras by their names and projectors as "projector of <camera>"; `covariance` has the rows
+    and columns of `OPTICS_PARAMETERS` for each part in turn. `boards` were seen by several cameras at once, with
+    the residual `rms_px`.
+    """
+
+    parts: tuple[str, ...]
+    covariance: Rows
+    boards: int = 0
+    rms_px: float = 0.0
+
+    def __post_init__(self) -> None:
+        size = len(OPTICS_PARAMETERS) * len(self.parts)
+        if [len(row) for row in self.covariance] != [size] * size:
+            raise BundleError(
+                f"The joint covariance of {len(self.parts)} devices is not {size} x {size}. Adjust them together "
+                "again: airlens calibrate together."
+            )
+
+    def covariance_of(self, *parts: str) -> Float[np.ndarray, "rows cols"]:
+        """The rows and columns of these parts, in this order. Raises BundleError for a part that it lacks."""
+        missing = [part for part in parts if part not in self.parts]
+        if missing:
+            raise BundleError(
+                f"{', '.join(map(repr, missing))} was not adjusted together with the others; known are "
+                f"{', '.join(map(repr, self.parts))}."
+            )
+        size = len(OPTICS_PARAMETERS)
+        which = np.concatenate([size * self.parts.index(part) + np.arange(size) for part in parts])
+        return np.array(self.covariance, float)[np.ix_(which, which)]
+
+
+@dataclass(frozen=True)
 class Bundle:
     """One calibration: the cameras, the projector, the wall, the responses.
 
     `projector`, `wall` and `projector_response` are those of the scene's first view; `further` holds those of the
-    others. `images` maps the name of each image used to its SHA-256; `ambient_temperature_k` and `minutes_on`
-    say how warm room and devices were.
+    others. `joint` is there while the views stand as they were adjusted together. `images` maps the name of each
+    image used to its SHA-256; `ambient_temperature_k` and `minutes_on` say how warm room and devices were.
     """
 
     date: str
@@ -170,6 +205,7 @@ class Bundle:
     ambient_temperature_k: float | None = None
     minutes_on: float | None = None
     further: tuple[FurtherView, ...] = ()
+    joint: Joint | None = None
     images: dict[str, str] = field(default_factory=dict)
     units: str = "m, rad, px, counts, e, K"
     schema: int = SCHEMA
@@ -223,6 +259,7 @@ class Bundle:
             wall=own.wall,
             projector_response=own.projector_response,
             further=(),
+            joint=None,
         )
 
     def with_view(self, camera: str, is_first: bool, **parts: Any) -> "Bundle":

@@ -110,11 +110,11 @@ def _state(record: Record, camera: Intrinsics, pair: Pair | None) -> tuple[_Stat
     covariance[:size, :size] = adjusted.covariance
     plane = None
     if record.level is not None:
-        plane, covariance[size:, size:] = _board_plane(record.level, devices[0])
+        plane, covariance[size:, size:] = board_plane(record.level, devices[0])
     return _State(devices, plane, covariance), None
 
 
-def _board_plane(board: SeenBoard, camera: Device) -> tuple[Plane, Float[np.ndarray, "3 3"]]:
+def board_plane(board: SeenBoard, camera: Device) -> tuple[Plane, Float[np.ndarray, "3 3"]]:
     """The plane of a board held flat against the wall, and the covariance of n / offset."""
     points, pixels = array_of(board.points_m, 3), array_of(board.camera_px, 2)
     _, rotation, translation = cv2.solvePnP(
@@ -172,8 +172,8 @@ def _optics(record: Record, state: _State, up: np.ndarray, world: WorldPose) -> 
         columns.append((ends[0] - ends[1]) / (2 * step))
     slopes = np.stack(columns, axis=1)
     whole = slopes @ state.covariance[np.ix_(free, free)] @ slopes.T
-    camera = (now[0], _rows(whole[:15, :15]))
-    return camera, (now[1], _rows(whole[15:, 15:]), _rows(whole[15:, :15])) if len(now) > 1 else None
+    camera = (now[0], rows(whole[:15, :15]))
+    return camera, (now[1], rows(whole[15:, 15:]), rows(whole[15:, :15])) if len(now) > 1 else None
 
 
 def _moved(state: _State, index: int, step: float) -> _State:
@@ -225,5 +225,6 @@ def _quality(fit: Intrinsics, advice: tuple[str, ...], size_px: tuple[int, int])
     return Quality("measured", fit.rms_px, len(fit.sightings), share, advice)
 
 
-def _rows(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:
+def rows(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    """A matrix as a bundle keeps it."""
     return tuple(tuple(map(float, row)) for row in matrix)

@@ -3,6 +3,7 @@
 calibration/bundle.json            what the reconstruction reads
 calibration/record-<camera>.json   board and wall points that the bundle was made from
 calibration/started-<step>-<camera>.json   the same, of a step that is not complete: used by nothing yet
+calibration/shared.json            boards that several cameras saw at once
 calibration/flat-<camera>.tif      flat field, if measured
 """
 
@@ -24,6 +25,8 @@ from app.rig.conditions import Conditions, known_pairs
 from calibration.bundle import Bundle, to_json
 from calibration.model import Model
 from calibration.record import Record, record_from_json, record_to_json
+from calibration.shared import SharedRecord, shared_from_json, shared_to_json
+from calibration.together import Together
 
 
 class StepName(StrEnum):
@@ -59,13 +62,11 @@ class CalibrationFolder:
 
     def live(self, what: str, camera: str) -> Path:
         """The folder of the pictures that a guided step takes with a camera."""
-        return self.folder / (
-            f"live-{what}" if self.is_first(camera) else f"live-{what}-{_in_a_name(camera)}"
-        )
+        return self.folder / (f"live-{what}" if self.is_first(camera) else f"live-{what}-{in_a_name(camera)}")
 
     def flat_field(self, camera: str) -> Path:
         """The file of a camera's flat field."""
-        return self.folder / f"flat-{_in_a_name(camera)}.tif"
+        return self.folder / f"flat-{in_a_name(camera)}.tif"
 
     def bundle(self) -> Bundle:
         """The bundle so far; an empty one if there is none. Raises BadInputError."""
@@ -142,7 +143,41 @@ class CalibrationFolder:
                 self.is_first(record.camera),
                 **{name: part for name, part in parts.items() if part is not None},
             )
-            return dataclasses.replace(new, date=now(), images=others | images)
+            return dataclasses.replace(new, date=now(), images=others | images, joint=None)
+
+        return self.change_bundle(change)
+
+    def shared(self) -> SharedRecord:
+        """The boards that several cameras saw at once, so far. Raises BadInputError."""
+        if not self._shared_path.exists():
+            return SharedRecord()
+        with reading(self._shared_path, "Remove it and take the boards again."):
+            return shared_from_json(self._shared_path.read_text(encoding="utf-8"), str(self._shared_path))
+
+    def save_shared(self, record: SharedRecord) -> None:
+        """Keep the boards that several cameras saw."""
+        make_folder(self.folder)
+        write_text(self._shared_path, shared_to_json(record))
+
+    def forget_shared(self) -> None:
+        """Forget those boards, with their live pictures; the calibration in use stays."""
+        self._shared_path.unlink(missing_ok=True)
+        shutil.rmtree(self.live_together, ignore_errors=True)
+
+    @property
+    def live_together(self) -> Path:
+        """The folder of the pictures that several cameras take at once: one folder a camera."""
+        return self.folder / "live-together"
+
+    def put_together(self, found: Together) -> Bundle:
+        """Make views that were adjusted together those in use."""
+
+        def change(old: Bundle) -> Bundle:
+            for name, view in found.views.items():
+                parts = {"projector": view.projector, "wall": view.wall}
+                kept = {part: value for part, value in parts.items() if value is not None}
+                old = old.with_camera(view.camera).with_view(name, self.is_first(name), **kept)
+            return dataclasses.replace(old, date=now(), joint=found.joint)
 
         return self.change_bundle(change)
 
@@ -160,14 +195,18 @@ class CalibrationFolder:
             write_text(bundle_path(self.experiment), to_json(bundle))
         return bundle
 
+    @property
+    def _shared_path(self) -> Path:
+        return self.folder / "shared.json"
+
     def _record_path(self, camera: str) -> Path:
-        return self.folder / f"record-{_in_a_name(camera)}.json"
+        return self.folder / f"record-{in_a_name(camera)}.json"
 
     def _started_path(self, step: StepName, camera: str) -> Path:
-        return self.folder / f"started-{step}-{_in_a_name(camera)}.json"
+        return self.folder / f"started-{step}-{in_a_name(camera)}.json"
 
 
-def _in_a_name(camera: str) -> str:
+def in_a_name(camera: str) -> str:
     """A camera's name as part of a file's."""
     return quote(camera, safe=" ()+,@")
 

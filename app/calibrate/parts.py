@@ -43,6 +43,27 @@ def _part(step: StepName, found: dict[str, Quality | None]) -> Part:
     return Part(step, _state(*found.values()), step is not StepName.response, lacking)
 
 
+@dataclass(frozen=True)
+class Ties:
+    """Whether the views' places are `joint`, found together, and in words what ties them."""
+
+    joint: bool
+    text: str
+
+
+def ties_of(experiment: Experiment) -> Ties | None:
+    """What ties several views that were calibrated from pictures; None of one, or of views that were given."""
+    bundle, names = bundle_of(experiment), [view.name for view in experiment.settings.scene.views]
+    measured = [c.name for c in bundle.cameras if c.name in names and c.quality.source == "measured"]
+    if len(measured) < 2:
+        return None
+    joint = bundle.joint
+    if joint is None:
+        return Ties(False, "each view by itself, tied by the walls alone")
+    by = f"{joint.boards} boards, residual {joint.rms_px:.3f} px" if joint.boards else "a common projector"
+    return Ties(True, f"{', '.join(n for n in names if n in joint.parts)} adjusted together by {by}")
+
+
 def is_calibrated(parts: tuple[Part, ...]) -> bool:
     """Whether nothing that is needed is missing."""
     return not any(part.needed and part.state == "missing" for part in parts)

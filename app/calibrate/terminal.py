@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import typer
 
@@ -14,6 +15,7 @@ from app.calibrate.folder import CalibrationFolder, StepName
 from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.calibrate.pictures import CalibrationStoppedError
 from app.calibrate.state import line_of
+from app.calibrate.together_live import TogetherPlan, TogetherSession, opened
 from app.errors import BadInputError
 from app.experiment.folder import Experiment, open_experiment
 from app.experiment.views import view_number
@@ -50,12 +52,12 @@ def run_live(folder: Path, plan: LivePlan, options: LiveOptions) -> None:
             guided.resume()
             for name in options.retake:
                 guided.retake(name)
-            _session(guided, plan.step, _Prompt(stage.arranges_itself, options.every_s, stopped), stopped)
+            _session(guided, plan.step, Prompt(stage.arranges_itself, options.every_s, stopped), stopped)
             guided.finish()
 
 
 def _session(
-    guided: GuidedCalibration, step: StepName, prompt: "_Prompt", stopped: Callable[[], bool]
+    guided: GuidedCalibration, step: StepName, prompt: "Prompt", stopped: Callable[[], bool]
 ) -> None:
     tries: dict[StageTask, int] = {}
     while (task := guided.wanted()) is not None and not stopped():
@@ -76,14 +78,55 @@ def _session(
             guided.skip()
 
 
-class _Prompt:
+def run_together(calibration: CalibrationFolder, plan: TogetherPlan, options: LiveOptions) -> tuple[str, ...]:
+    """Guide through places of a board that several cameras see; returns what is wrong with the pictures.
+
+    Ctrl-C keeps what there is; the same command goes on.
+    """
+    from app.capture.burst import interruptible
+
+    issues: list[str] = []
+    with interruptible() as stopped, opened(open_experiment(calibration.experiment), plan.board) as stages:
+        session = TogetherSession(calibration, plan, stages)
+        issues += session.resume()
+        for name in options.retake:
+            session.retake(name)
+        prompt = Prompt(session.arranges_itself, options.every_s, stopped)
+        while (task := session.wanted()) is not None and not stopped():
+            if not prompt.ready(task, session):
+                continue
+            try:
+                found = session.take(stopped)
+            except CalibrationStoppedError as stop:
+                typer.echo(str(stop), err=True)
+                break
+            issues += found
+            for issue in found:
+                typer.echo(f"- {issue}", err=True)
+            typer.echo(f"{session.places} of {plan.places} places seen by several cameras", err=True)
+    return tuple(issues)
+
+
+class Guided(Protocol):
+    """What asks for one thing after another."""
+
+    def skip(self) -> None:
+        """Do without what is wanted now."""
+        ...
+
+    def retake(self, name: str) -> object:
+        """Forget what was taken under a name. Raises BadInputError."""
+        ...
+
+
+class Prompt:
     """Says what to arrange, then waits for Enter, for the clock, or not at all (a simulated rig)."""
 
     def __init__(self, simulated: bool, every_s: float | None, stopped: Callable[[], bool]) -> None:
         self._simulated, self._every_s, self._stopped = simulated, every_s, stopped
         self.attended = not simulated and every_s is None
 
-    def ready(self, task: StageTask, guided: GuidedCalibration) -> bool:
+    def ready(self, task: StageTask, guided: "Guided") -> bool:
         """Whether to take the picture now; False after a skip, a retake, or the end."""
         typer.echo(task.text, err=True)
         if self._simulated:

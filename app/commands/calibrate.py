@@ -22,6 +22,10 @@ STEPS = {
         _MODULE,
         "Measure dark level, gain, read noise, linearity, the projector's curve and the flat field.",
     ),
+    "together": (
+        "app.commands.calibrate_together",
+        "Adjust several views together, by a board that their cameras see at the same time: live, or in pictures.",
+    ),
     "drift": (
         _MODULE,
         "Measure what moved between two exposures: camera and, with printed marks, projector apart.",

@@ -18,7 +18,7 @@ from app.rig.stage import RealStage, Stage, StageTask
 from calibration.board import Board
 from core.geometry import Optics
 from core.scene import ProjectedPattern, Scene
-from core.view_frame import facing
+from core.view_frame import facing, turn_of
 from drivers.burst import CaptureRole
 from drivers.clock import Clock, SystemClock
 from drivers.display import PatternDisplay, Picture
@@ -137,7 +137,7 @@ class PracticeStage:
         name, noise = scene.views[view].name, _sensor(scene, settings, view)
         self.panel_px = panel_of(scene, view)
         framed, number = facing(scene, view)
-        self._room = PracticeRoom(framed, number, board)
+        self._room = PracticeRoom(framed, number, board, turn_of(scene, view))
         light = framed.light
         panel = light.projector if isinstance(light, ProjectedPattern) else None
         self.display = None if panel is None else _PracticeDisplay(panel, self._room.show)

@@ -3,12 +3,13 @@
 import numpy as np
 from jaxtyping import Float32
 
-from app.rig.stage import StageTask, board_size_m
+from app.rig.stage import HeldBoard, StageTask, board_size_m
 from calibration.board import Board
 from calibration.guide import WantedView, pose_of
 from calibration.simulated_pictures import Look, Sheet, look
-from core.geometry import Optics
+from core.geometry import Optics, rotation_matrix
 from core.scene import ProjectedPattern, Scene
+from core.view_frame import Turn
 from drivers.display import Picture
 
 # World axes of a sheet that faces the camera: x to the right, y down, normal away from it.
@@ -24,9 +25,13 @@ NEAREST_TO_WALL = 0.85
 
 
 class PracticeRoom:
-    """Callable as a camera's view. `show` is the projector's panel; `arrange` moves board and lens cap."""
+    """Callable as a camera's view. `show` is the projector's panel; `arrange` moves board and lens cap.
 
-    def __init__(self, scene: Scene, view: int, board: Board | None) -> None:
+    The scene is in the view's own frame; `turn` leads there from the room, in which several cameras see one board.
+    """
+
+    def __init__(self, scene: Scene, view: int, board: Board | None, turn: Turn | None = None) -> None:
+        self._turn = np.eye(3) if turn is None else turn.matrix
         self._camera: Optics = scene.views[view].camera
         light = scene.light
         self._projector = light.projector if isinstance(light, ProjectedPattern) else None
@@ -43,10 +48,12 @@ class PracticeRoom:
         sheets = [self._wall()]
         if self._board is not None and task.kind in ("board", "place") and task.view is not None:
             sheets.append(self._held(task.view, self._board))
+        if self._board is not None and task.held is not None:
+            sheets.append(_printed(self._board, *_placed(task.held, self._turn)))
         if self._board is not None and task.kind == "level":
             sheets.insert(0, self._on_wall(self._board))
         self._covered = task.kind == "dark"
-        self._by_room = self._projector is None or task.kind in ("board", "level")
+        self._by_room = self._projector is None or task.kind in ("board", "shared", "level")
         self._look = look(self._camera, tuple(sheets), self._projector)
         self._seen = None
 
@@ -86,6 +93,11 @@ class PracticeRoom:
         origin = np.array(self._camera.position_m)
         centre_m = origin + towards * (self._wall_y_m - origin[1]) / towards[1]
         return _printed(board, centre_m - np.array([0.0, 1e-6, 0.0]), FACING)
+
+
+def _placed(held: HeldBoard, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Centre and axes of a board of the room in the view's frame."""
+    return turn @ np.array(held.centre_m), turn @ rotation_matrix(held.rotation_rad)
 
 
 def _printed(board: Board, centre_m: np.ndarray, world_from_sheet: np.ndarray) -> Sheet:

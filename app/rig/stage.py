@@ -12,20 +12,34 @@ from jaxtyping import Float
 from app.errors import AirlensError
 from calibration.board import Board
 from calibration.guide import WantedView
+from core.geometry import Vector3
 from drivers.display import PatternDisplay
 from drivers.protocols import Camera
 
-# A board by the room's light, or (place) in the dark under the projector's.
-TaskKind = Literal["board", "place", "wall", "level", "dark", "light"]
+# A board by the room's light, before one camera or (shared) before several, or (place) in the dark under the
+# projector's.
+TaskKind = Literal["board", "shared", "place", "wall", "level", "dark", "light"]
+
+
+@dataclass(frozen=True)
+class HeldBoard:
+    """Where a board is held in the room: its centre, and its axes (x along its rows, y down, away from who looks)."""
+
+    centre_m: Vector3
+    rotation_rad: Vector3
 
 
 @dataclass(frozen=True)
 class StageTask:
-    """One thing to arrange before the next pictures, in the operator's words; `view` only for a board."""
+    """One thing to arrange before the next pictures, in the operator's words; `view` only for a board.
+
+    `held` is where a simulated rig holds a board that several cameras see.
+    """
 
     kind: TaskKind
     text: str
     view: WantedView | None = None
+    held: HeldBoard | None = None
 
 
 @runtime_checkable

@@ -17,6 +17,7 @@ class NextResource(WireModel):
         "print pattern",
         "print board",
         "calibrate",
+        "calibrate together",
         "reference",
         "flow",
         "reconstruct",

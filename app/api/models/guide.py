@@ -17,7 +17,7 @@ Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 class WantedResource(WireModel):
     """What to arrange next, in words; a board's place as parts of the picture, and which edge is nearer."""
 
-    kind: Literal["board", "place", "wall", "level", "dark", "light"]
+    kind: Literal["board", "shared", "place", "wall", "level", "dark", "light"]
     text: str
     column: float | None
     row: float | None

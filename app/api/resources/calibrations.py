@@ -4,15 +4,25 @@ import numpy as np
 from fastapi import APIRouter
 from jaxtyping import Float
 
-from app.api.models.calibrations import CalibrationItem, CalibrationResource, NewCalibration, StandingResource
+from app.api.models.calibrations import (
+    CalibrationItem,
+    CalibrationResource,
+    NewCalibration,
+    NewTogether,
+    PairResource,
+    StandingResource,
+    TogetherResource,
+)
 from app.api.services import Given
 from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
-from app.calibrate.folder import StepName
-from app.calibrate.parts import Part, bundle_of, is_calibrated, parts_of
+from app.calibrate.folder import CalibrationFolder, StepName
+from app.calibrate.parts import Part, bundle_of, is_calibrated, parts_of, ties_of
+from app.calibrate.together import summary, together
 from app.experiment.folder import Experiment
 from app.simulate.rehearsal import calibrate_simulated
 from calibration.bundle import Bundle, CalibratedOptics
+from calibration.together import Stated
 from core.geometry import Optics, face_of
 from core.scene import Scene, View
 
@@ -46,6 +56,21 @@ def calibrate(given: Given, experiment: Identifier, new: NewCalibration) -> Cali
     return _resource(found)
 
 
+@router.post("/experiments/{experiment}/calibration/together", status_code=201)
+def calibrate_together(given: Given, experiment: Identifier, new: NewTogether) -> TogetherResource:
+    """Adjust the calibrated views together, by boards that several cameras saw and a projector that they share."""
+    found = given.folders.open(experiment)
+    told = summary(together(CalibrationFolder(found.folder), Stated(tape_std_m=new.tape_std_m)))
+    given.ledger.append_event("experiment", {"experiment": experiment, "calibrated": True})
+    return TogetherResource(
+        pairs=[PairResource.model_validate(pair) for pair in told["pairs"]],
+        boards=told["boards"],
+        rms_px=told["rms_px"],
+        issues=told["issues"],
+        calibration=_resource(found),
+    )
+
+
 def _resource(experiment: Experiment) -> CalibrationResource:
     bundle, parts = bundle_of(experiment), parts_of(experiment)
     room, scene = experiment.settings.scene.room, experiment.settings.scene
@@ -56,7 +81,7 @@ def _resource(experiment: Experiment) -> CalibrationResource:
     return CalibrationResource(
         state="calibrated" if is_calibrated(parts) else "incomplete",
         date=bundle.date if experiment.bundle_path.is_file() else None,
-        items=[*items, *lacking],
+        items=[*items, *lacking, *_ties(experiment)],
         room_m=[list(room.lower_m), list(room.upper_m)],
         rig=[standing for view, own in views for standing in _rig(own, view, scene, several)],
     )
@@ -123,6 +148,16 @@ def _items(own: Bundle, view: str) -> list[CalibrationItem]:
         name, source = f"response of {response.name}", response.quality.source
         items.append(CalibrationItem(name=name, state=source, value=value, advice=""))
     return items
+
+
+def _ties(experiment: Experiment) -> list[CalibrationItem]:
+    """Whether several views were adjusted together."""
+    tied = ties_of(experiment)
+    if tied is None:
+        return []
+    advice = "" if tied.joint else "Adjust them together: airlens calibrate together."
+    state = "measured" if tied.joint else "missing"
+    return [CalibrationItem(name="views together", state=state, value=tied.text, advice=advice)]
 
 
 def _missing(part: Part, view: str) -> CalibrationItem:

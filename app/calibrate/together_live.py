@@ -1,0 +1,146 @@
+"""Boards before several cameras at once, live on the rig: one place after another, a picture by each camera."""
+
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.calibrate.folder import CalibrationFolder, in_a_name
+from app.calibrate.pictures import Shooter
+from app.calibrate.together import add_pictures
+from app.errors import BadInputError
+from app.experiment.folder import Experiment, open_experiment
+from app.experiment.views import view_names
+from app.rig.open import open_stage
+from app.rig.stage import HeldBoard, Stage, StageTask, board_size_m
+from calibration.board import Board
+from calibration.common_places import common_places
+from core.geometry import rotation_vector
+from drivers.capture import Abort
+
+# Three places fix two cameras; twice as many show one that does not fit.
+PLACES = 6
+
+
+@dataclass(frozen=True)
+class TogetherPlan:
+    """How to take the pictures: `frames` are averaged into one; so many `places` of the board are asked for."""
+
+    board: Board
+    frames: int = 1
+    places: int = PLACES
+
+
+class TogetherSession:
+    """The cameras of all views, open. `wanted` says what to arrange; `take` takes the pictures of it."""
+
+    def __init__(
+        self, calibration: CalibrationFolder, plan: TogetherPlan, stages: Mapping[str, Stage]
+    ) -> None:
+        self._calibration, self._plan, self._stages = calibration, plan, dict(stages)
+        scene = open_experiment(calibration.experiment).settings.scene
+        self._held: list[HeldBoard] = []
+        self._skipped = 0
+        if self.arranges_itself:
+            cameras = tuple(view.camera for view in scene.views)
+            # More than are wanted: one in which the board is not found is passed over.
+            places = common_places(cameras, scene.room, board_size_m(plan.board), 2 * plan.places)
+            self._held = [HeldBoard(centre_m, rotation_vector(axes)) for centre_m, axes in places]
+            if not self._held:
+                raise BadInputError(
+                    "No place in the room is seen whole by two cameras. Turn the cameras towards one another's "
+                    "view, or take a smaller board."
+                )
+
+    @property
+    def arranges_itself(self) -> bool:
+        """Whether boards are held by a simulated rig."""
+        return all(stage.arranges_itself for stage in self._stages.values())
+
+    @property
+    def places(self) -> int:
+        """How many places two cameras or more have seen."""
+        return len(self._calibration.shared().boards)
+
+    def wanted(self) -> StageTask | None:
+        """The next thing to arrange; None once there are enough places."""
+        number = self._next()
+        held = self._held[number] if number < len(self._held) else None
+        enough = self.places + self._skipped >= self._plan.places
+        if enough or (self.arranges_itself and held is None):
+            return None
+        text = (
+            f"Place {self.places + 1} of {self._plan.places}: hold the board where two cameras or more "
+            f"({', '.join(self._stages)}) see it whole, facing halfway between them, elsewhere and tilted otherwise "
+            "than before; keep it still."
+        )
+        return StageTask("shared", text, held=held)
+
+    def skip(self) -> None:
+        """Do with one place less."""
+        self._skipped += 1
+
+    def retake(self, name: str) -> None:
+        """Forget a place and its pictures. Raises BadInputError when there is none of that name."""
+        record = self._calibration.shared()
+        pictures = list(self._calibration.live_together.glob(f"*/{name}.*"))
+        if not pictures and name not in [board.name for board in record.boards]:
+            known = ", ".join(board.name for board in record.boards) or "none"
+            raise BadInputError(f"There is no place {name!r}; known are: {known}.")
+        self._calibration.save_shared(record.without(name))
+        for picture in pictures:
+            picture.unlink(missing_ok=True)
+
+    def take(self, abort: Abort | None = None) -> tuple[str, ...]:
+        """A picture by each camera at the same time; returns what is wrong with them.
+
+        Raises CalibrationStoppedError, AirlensError, DeviceError; pictures taken before that are kept.
+        """
+        task = self.wanted()
+        if task is None:
+            return ()
+        for stage in self._stages.values():
+            stage.arrange(task)
+        name, folder = f"place_{self._next():02d}", self._calibration.live_together
+        with ThreadPoolExecutor(len(self._stages), "together") as threads:
+            under_way = [
+                threads.submit(
+                    Shooter(stage, self._plan.frames, 0.0, lambda done, total: None, abort).one,
+                    folder / in_a_name(view) / f"{name}.png",
+                )
+                for view, stage in self._stages.items()
+            ]
+        for one in under_way:
+            one.result()
+        return self._used(folder, name)
+
+    def resume(self) -> tuple[str, ...]:
+        """Use pictures that an earlier session took and did not come to use."""
+        folder, known = self._calibration.live_together, {b.name for b in self._calibration.shared().boards}
+        left = sorted({path.stem for path in folder.glob("*/place_*")} - known)
+        return tuple(issue for name in left for issue in self._used(folder, name))
+
+    def _used(self, folder: Path, name: str) -> tuple[str, ...]:
+        full_scale = min(2**stage.camera.info.bits - 1 for stage in self._stages.values())
+        return add_pictures(
+            self._calibration, folder, self._plan.board, full_scale, lambda told: None, f"{name}.*"
+        )
+
+    def _next(self) -> int:
+        """One more than the largest number of a place that was pictured."""
+        taken = self._calibration.live_together.glob("*/place_*")
+        numbers = [int(path.stem.removeprefix("place_")) for path in taken if path.stem[6:].isdigit()]
+        return 1 + max(numbers, default=-1)
+
+
+@contextmanager
+def opened(experiment: Experiment, board: Board) -> Iterator[dict[str, Stage]]:
+    """The stages of all views, by their names, with open cameras. Raises BadInputError, DeviceError."""
+    with ExitStack() as stack:
+        stages = {}
+        for number, name in enumerate(view_names(experiment)):
+            stage = open_stage(experiment, board, None, number)
+            stack.enter_context(stage.camera)
+            stages[name] = stage
+        yield stages
