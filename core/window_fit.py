@@ -3,10 +3,10 @@
     I_flow - I_ref = -d . grad I + (a + b . x + x . C x + D xxx) I + c + noise,        I = (I_ref + I_flow) / 2
 
 The gain may vary over the window to third order (a, b, C, D): a lamp that ripples looks like a shift otherwise. C and
-D are as small as a ripple is expected to be, so that small windows lose little by them. The picture's gradient carries noise
-of its own, of known variance s^2 |taps|^2 / 4 a pixel, which is taken out of the normal matrix: dim pictures would
-show shifts too small (Fuller, Measurement Error Models, 1987, section 1.2). What is left beyond the noise (a chi-
-squared above 1) counts as noise: the information is divided by it (Birge's ratio).
+D are as small as a ripple is expected to be, so that small windows lose little by them. The picture's gradient
+carries noise of its own, of known variance s^2 |taps|^2 / 4 a pixel, which is taken out of the normal matrix: dim
+pictures would show shifts too small (Fuller, Measurement Error Models, 1987, section 1.2). What is left beyond the
+noise (a chi-squared above 1) counts as noise: the information is divided by it (Birge's ratio).
 """
 
 import equinox as eqx
