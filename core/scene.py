@@ -148,6 +148,8 @@ class View:
     """The patterned wall that it looks at."""
     light: Light | None = None
     """What patterns that wall; without it, the scene's light."""
+    camera_of: str | None = None
+    """The view whose camera takes these pictures too, in turn: under a projector of this view's own."""
     noise: CameraNoise = CameraNoise()
     """How its frames scatter."""
     frames: int = 100
@@ -453,7 +455,33 @@ class Scene:
                 )
         if isinstance(self.light, ProjectedPattern):
             _check_place("The projector", self.light.projector.position_m, self.room, "y_max")
+        for view in self.views:
+            _check_camera_of(self, view)
         _check_objects(self)
+
+
+def _check_camera_of(scene: Scene, view: View) -> None:
+    """A camera that serves several views sees the same wall in each, under one projector at a time."""
+    if view.camera_of is None:
+        return
+    named = f"View {view.name!r} is taken by the camera of {view.camera_of!r}"
+    owner = next((one for one in scene.views if one.name == view.camera_of), None)
+    if owner is None or owner is view or owner.camera_of is not None:
+        whose = [repr(one.name) for one in scene.views if one.camera_of is None and one is not view]
+        raise SettingError(
+            f"{named}; expected a view that has a camera of its own: {', '.join(whose) or 'there is none'}."
+        )
+    if view.wall != owner.wall:
+        raise SettingError(
+            f"{named} and looks at {view.wall}, that one at {owner.wall}. Give both the same wall, or this view a "
+            "camera of its own."
+        )
+    theirs = owner.light or scene.light
+    if not (isinstance(view.light, ProjectedPattern) and isinstance(theirs, ProjectedPattern)):
+        raise SettingError(
+            f"{named}; expected a projector for each of the two, to light the wall in turn. Give this view a light "
+            "of its own of kind 'projector'; a print on the wall cannot be switched off."
+        )
 
 
 def _check_std(what: str, value: float, unit: str) -> None:

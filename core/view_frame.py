@@ -135,9 +135,14 @@ def _turned(scene: Scene, view: int) -> Scene:
     light: Light = scene.light if eye.light is None else eye.light
     if isinstance(light, ProjectedPattern):
         light = replace(light, projector=turn.optics(light.projector))
-    own = replace(eye, wall="y_max", light=None, camera=turn.optics(eye.camera))
+    own = replace(eye, wall="y_max", light=None, camera_of=None, camera=turn.optics(eye.camera))
     objects = tuple(turn.thing(item) for item in scene.objects)
     return replace(scene, room=turn.box(scene.room), views=(own,), light=light, boundary=(), objects=objects)
+
+
+def each_alone(scene: Scene) -> Scene:
+    """The scene with a camera for every view: where one light is tried in the place of another."""
+    return replace(scene, views=tuple(replace(view, camera_of=None) for view in scene.views))
 
 
 def field_facing(field: AbstractField, turn: Turn) -> AbstractField:

@@ -79,7 +79,7 @@ def create_services(config: ServiceConfig) -> Services:
         CurveCache(ledger),
         SolutionCache(),
         cameras,
-        CaptureDesk(cameras, news.tell, beside=beside),
+        CaptureDesk(cameras, news.tell, beside=beside, projector=projector),
         beside,
         CalibrationDesk(cameras, screen, news.tell),
         screen,

@@ -29,10 +29,12 @@ def parts_of(experiment: Experiment) -> tuple[Part, ...]:
     by_step: dict[StepName, dict[str, Quality | None]] = {step: {} for step in StepName}
     for number, view in enumerate(scene.views):
         own = bundle_of(experiment).of(view.name, number == 0)
-        response = own.response()
-        by_step[StepName.camera][view.name] = own.cameras[0].quality if own.cameras else None
         if isinstance(view.light or scene.light, ProjectedPattern):
             by_step[StepName.projector][view.name] = None if own.projector is None else own.projector.quality
+        if view.camera_of is not None:
+            continue  # all but its projector is that of the camera's own view
+        response = own.response()
+        by_step[StepName.camera][view.name] = own.cameras[0].quality if own.cameras else None
         by_step[StepName.wall][view.name] = None if own.wall is None else own.wall.quality
         by_step[StepName.response][view.name] = None if response is None else response.quality
     return tuple(_part(step, found) for step, found in by_step.items() if found)

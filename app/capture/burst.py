@@ -16,11 +16,13 @@ from typing import Any
 from app.capture.checks import judged
 from app.capture.views import OpensView, ViewCapture, together
 from app.capture.watched import UNWATCHED, BurstWatch, run_watched
+from app.errors import BadInputError
 from app.experiment.folder import Experiment, new_id
 from app.experiment.recorder import CaptureRecorder
-from app.experiment.views import view_names
+from app.experiment.views import take_turns, view_names
 from app.files.disk_space import check_room
 from app.rig.conditions import UNTOLD, Conditions, conditions_of, known_pairs, seconds_on
+from app.rig.lamps import Lamps
 from app.rig.open import air_of, clock_of, open_camera
 from drivers.burst import Burst, BurstOutcome, CapturePlan
 from drivers.capture import Abort
@@ -113,16 +115,23 @@ def take(
     moment: int | None = None,
     at_once: bool = False,
     opens: OpensView | None = None,
+    lamps: Lamps | None = None,
 ) -> TakenBurst:
     """Take one burst into a new folder below captures/, by `name` where that was given out already.
 
     The cameras of further views, opened by `opens`, take theirs in turn once the first has ended, or `at_once`, and
-    all pictures are one capture. One that fails is named by `failed`, and what the others took is kept. A raw stack
-    is kept of the first. `moment` is as in `open_camera`; `sequence` says which burst of how many it is; `source`
-    says where the frames come from, where that is not the rig; `known` are verdicts that the frames cannot tell;
-    `series` is its place between two references. Raises AirlensError without room for it, DeviceError.
+    all pictures are one capture. One that fails is named by `failed`, and what the others took is kept. `lamps` are
+    the projectors that light one wall in turn. A raw stack is kept of the first. `moment` is as in `open_camera`;
+    `sequence` says which burst of how many it is; `source` says where the frames come from, where that is not the
+    rig; `known` are verdicts that the frames cannot tell; `series` is its place between two references. Raises
+    AirlensError without room for it, DeviceError.
     """
     check_room(experiment.folder, plan, camera.info)
+    if at_once and take_turns(experiment):
+        raise BadInputError(
+            "One camera takes the pictures of several views here, under one projector after the other: that is in "
+            "turn, not at once. Leave at_once out."
+        )
     name = name or new_id(experiment.captures_folder, plan.role)
     recorder = CaptureRecorder(experiment.captures_folder / name, plan)
     watch.begun(recorder.folder)
@@ -133,7 +142,7 @@ def take(
         origin |= {} if series is None else {"series": dict(series)}
         if source is None and len(experiment.settings.scene.views) > 1:
             opens = opens or (lambda view: open_camera(experiment, air_of(plan.role), view, moment))
-            cameras = ViewCapture(experiment, camera, opens, plan, told, watch, recorder.observe)
+            cameras = ViewCapture(experiment, camera, opens, plan, told, watch, recorder.observe, lamps)
             return _take_views(cameras, recorder, origin, at_once)
         burst = run_watched(camera, plan, watch, recorder.observe, seconds_on(experiment.settings, told))
         if burst.outcome is BurstOutcome.ABORTED and watch.stop() == "discard":
@@ -172,8 +181,9 @@ def take_order(
     watch: BurstWatch = UNWATCHED,
     name: str | None = None,
     opens: OpensView | None = None,
+    lamps: Lamps | None = None,
 ) -> list[TakenBurst]:
-    """Take every burst of an order, the first by `name`; fewer when it is stopped. `opens` is as in `take`.
+    """Take every burst of an order, the first by `name`; fewer when it is stopped. `opens`, `lamps` are as in `take`.
 
     Raises DeviceSettingError for times that cannot be kept.
     """
@@ -198,6 +208,7 @@ def take_order(
                 name=own,
                 at_once=order.at_once,
                 opens=opens,
+                lamps=lamps,
             )
         )
         if taken[-1].folder is not None and not taken[-1].shortfall:

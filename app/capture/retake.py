@@ -18,6 +18,7 @@ from app.experiment.recorder import CaptureRecorder
 from app.experiment.views import view_names, view_number
 from app.files.disk_space import check_room
 from app.rig.conditions import UNTOLD, Conditions, seconds_on
+from app.rig.lamps import Lamps
 from drivers.burst import BurstOutcome
 from drivers.protocols import Camera
 
@@ -51,13 +52,16 @@ def retake(
     told: Conditions = UNTOLD,
     watch: BurstWatch = UNWATCHED,
     name: str | None = None,
+    lamps: Lamps | None = None,
 ) -> TakenBurst:
     """Take the burst of one view by its camera, as the capture asked for it, into the folder of `name_of_retake`.
 
+    `lamps` are as in `take`.
     Raises AirlensError, DeviceError.
     """
     plan, whole = parts.plan, not parts.missing
     check_room(experiment.folder, plan, camera.info)
+    (lamps or Lamps(experiment)).light(number)
     folder = experiment.captures_folder / (name or name_of_retake(experiment, parts))
     recorder = CaptureRecorder(folder, plan)
     watch.begun(folder)

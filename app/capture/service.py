@@ -9,7 +9,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -22,13 +22,17 @@ from app.capture.watched import BurstWatch, OnAbort
 from app.errors import AirlensError
 from app.experiment.folder import Experiment, new_id
 from app.experiment.recorder import release, reserve
+from app.experiment.views import camera_number
 from app.live.beside import LiveAir
 from app.rig.conditions import Conditions
+from app.rig.lamps import Lamps
 from app.rig.live_cameras import LiveCameras
-from app.rig.open import AirState, air_of, open_camera
+from app.rig.live_projector import LiveProjector
+from app.rig.open import AirState, air_of, open_camera, open_projector
 from app.states import StateMachine
 from drivers.burst import BurstOutcome, CapturePlan, Progress
 from drivers.errors import DeviceBusyError, DeviceError
+from drivers.projector.protocol import Projector
 from drivers.protocols import Camera
 
 TOLD_EVERY_S = 1.0
@@ -120,6 +124,7 @@ class CaptureDesk:
     """Takes captures with the cameras of `live`; `tell(kind, body)` hears of state and progress, and never raises.
 
     `opener` opens the camera of an experiment's view. `beside` looks at the bursts of orders that ask for it.
+    `projector` is the one that the service speaks to already.
     """
 
     def __init__(
@@ -128,8 +133,10 @@ class CaptureDesk:
         tell: Callable[[str, Mapping[str, Any]], object],
         opener: Callable[[Experiment, AirState, int, int | None], Camera] = open_camera,
         beside: LiveAir | None = None,
+        projector: LiveProjector | None = None,
     ) -> None:
         self._live, self._tell, self._opener, self._beside = live, tell, opener, beside
+        self._projector = projector
         self._status = DeskStatus()
         self._lock = threading.RLock()
         self._now: _Run | None = None
@@ -152,7 +159,9 @@ class CaptureDesk:
             reserve(experiment.captures_folder / name, plan)
 
             def takes(camera: Camera, watch: BurstWatch, opens: OpensView) -> tuple[CaptureEvent, str]:
-                return _ending(order, take_order(camera, experiment, order, watch, name, opens))
+                return _ending(
+                    order, take_order(camera, experiment, order, watch, name, opens, self._lamps(experiment))
+                )
 
             return self._begin(state, _Run(experiment, plan, name, takes, live=order.live), order.bursts)
 
@@ -169,10 +178,21 @@ class CaptureDesk:
                 reserve(experiment.captures_folder / name, plan)
 
             def takes(camera: Camera, watch: BurstWatch, opens: OpensView) -> tuple[CaptureEvent, str]:
-                taken = retake(camera, experiment, parts, number, told, watch, name)
+                lamps = self._lamps(experiment)
+                taken = retake(camera, experiment, parts, number, told, watch, name, lamps)
                 return _ending(Order(plan), [taken])
 
             return self._begin(state, _Run(experiment, plan, name, takes, number, place_of(parts.origin)), 1)
+
+    def _lamps(self, experiment: Experiment) -> Lamps:
+        """The projectors; the first one's line may be held by the service itself."""
+        held, source = self._projector, experiment.folder.name
+
+        def opens(view: int) -> AbstractContextManager[Projector]:
+            found = None if held is None or view != 0 else held.held(source)
+            return closing(open_projector(experiment, view)) if found is None else nullcontext(found)
+
+        return Lamps(experiment, opens)
 
     def _begin(self, state: DeskState, run: _Run, bursts: int) -> DeskStatus:
         """Let a run go on by itself; the desk is locked meanwhile."""
@@ -276,8 +296,9 @@ class CaptureDesk:
     @contextmanager
     def _using(self, run: _Run, view: int) -> Iterator[Camera]:
         """Hold the camera of a view, opened unless it is; a simulated room is told what its air does."""
-        source, air, live = run.experiment.folder.name, air_of(run.plan.role), self._live.of(view)
         simulated = run.experiment.settings.rig.camera_kind == "simulated"
+        view = view if simulated else camera_number(run.experiment, view)
+        source, air, live = run.experiment.folder.name, air_of(run.plan.role), self._live.of(view)
         wanted = (source, air if simulated else live.air)
         again = live.status.state.value != "ready" or (live.status.experiment, live.air) != wanted
         if again or (simulated and run.moment is not None):

@@ -12,8 +12,9 @@ from app.capture.start_together import StartTogether
 from app.capture.watched import BurstWatch, run_watched
 from app.errors import AirlensError
 from app.experiment.folder import Experiment
-from app.experiment.views import view_names
+from app.experiment.views import camera_number, view_names
 from app.rig.conditions import Conditions, seconds_on
+from app.rig.lamps import Lamps
 from drivers.burst import Burst, BurstOutcome, CapturePlan, Progress
 from drivers.capture import OnFrame, Taken
 from drivers.errors import DeviceError
@@ -41,7 +42,7 @@ class ViewBursts:
 class ViewCapture:
     """A capture of all views by `camera`, which is open and the first one's, and by those that `opens` opens.
 
-    `keep` gets the frames of the first.
+    `keep` gets the frames of the first. Before each turn `lamps` lights the wall by that view's projector.
     """
 
     experiment: Experiment
@@ -51,8 +52,10 @@ class ViewCapture:
     told: Conditions
     watch: BurstWatch
     keep: OnFrame
+    lamps: Lamps | None = None
 
     def __post_init__(self) -> None:
+        self._lamps = self.lamps or Lamps(self.experiment)
         self._names = view_names(self.experiment)
         self._bursts: dict[int, Burst] = {}
         self._failed: dict[str, str] = {}
@@ -63,12 +66,15 @@ class ViewCapture:
 
     def in_turn(self) -> ViewBursts:
         """One burst after the other; each camera is opened when its turn has come. An abort ends them all."""
-        self._take(0, self.camera, self.watch)
+        with self._caught(0):
+            self._lamps.light(0)
+            self._take(0, self.camera, self.watch)
         for number in range(1, len(self._names)):
             if any(burst.outcome is BurstOutcome.ABORTED for burst in self._bursts.values()):
                 self._failed[self._names[number]] = "the capture was stopped before its turn"
                 continue
             with self._caught(number), self._alone(number) as own:
+                self._lamps.light(number)
                 self._take(number, own, self.watch)
         return self._found()
 
@@ -137,6 +143,12 @@ class ViewCapture:
     @contextmanager
     def _alone(self, number: int) -> Iterator[Camera]:
         """The camera of a view; where it cannot be opened beside the first one, that one rests meanwhile."""
+        if (
+            self.experiment.settings.rig.camera_kind != "simulated"
+            and camera_number(self.experiment, number) == 0
+        ):
+            yield self.camera
+            return
         with ExitStack() as stack:
             try:
                 own = stack.enter_context(self.opens(number))

@@ -84,6 +84,13 @@ def simulate(
         tuple[float, float] | None,
         typer.Option(help="Projector minus camera, horizontal and vertical [m]; the rig's by default."),
     ] = None,
+    further_projector: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A further projector that lights the first wall in turn, for the same camera: minus camera, "
+            "horizontal and vertical [m], such as -1,-1; may be given several times."
+        ),
+    ] = None,
     noise_free: Annotated[
         bool, typer.Option("--noise-free", help="No shot, read or rounding noise.")
     ] = False,
@@ -105,6 +112,7 @@ def simulate(
         pattern_seed=seed,
         walls=parse_walls(views),
         marks=marks,
+        further_projectors_m=tuple(parse_baseline(text) for text in further_projector or ()),
     )
     shown = changed(WORLDS[world], nuisance or [], drift_px, border, misread)
     camera = shown.camera(seed, noise_free).model_copy(update={"frame_rate_hz": frame_rate})
@@ -128,6 +136,19 @@ def simulate(
             snapshots_path=snapshots,
         )
     typer.echo(f"{experiment}: reference and flow captured. Next: airlens reconstruct {experiment}")
+
+
+def parse_baseline(text: str) -> "tuple[float, float]":
+    """'-1,-1' to metres. Raises BadInputError."""
+    from app.errors import BadInputError
+
+    try:
+        across, up = (float(part) for part in text.split(","))
+    except ValueError:
+        raise BadInputError(
+            f"--further-projector is {text!r}; expected metres across and up from the camera, such as -1,-1."
+        ) from None
+    return across, up
 
 
 def parse_walls(text: str) -> "tuple[WallName, ...]":

@@ -69,6 +69,17 @@ class ChoiceLine(Strict):
     reason: str
 
 
+class SecondLightLine(Strict):
+    """A second projector for the first camera, in turn with the first: where, and what the images would fix.
+
+    `twice_the_frames`: what they would fix without it, by as many frames in all.
+    """
+
+    position_m: list[float]
+    images: float
+    twice_the_frames: float
+
+
 class SeenLine(Strict):
     """Shares of an unknown temperature's variance that are found."""
 
@@ -77,6 +88,7 @@ class SeenLine(Strict):
     images: float
     boundary: float
     both: float
+    second_light: SecondLightLine | None = None
 
 
 class PresetLine(Strict):

@@ -171,6 +171,8 @@ class RigSettings(Strict):
     """The cameras of the other views, by the view's name; a simulated rig needs none."""
     projector: ProjectorSettings | None = None
     """The projector, where it is spoken to."""
+    projectors: dict[str, ProjectorSettings] | None = None
+    """The projectors of other views, by the view's name; where one camera sees several, all must be spoken to."""
     board: BoardSettings | None = None
     """The board for calibration."""
 
@@ -184,5 +186,6 @@ class RigSettings(Strict):
         """The device files and hosts that this rig opens; simulated twins open none."""
         cameras = (self.camera, *(self.cameras or {}).values())
         camera = tuple(one.device for one in cameras if isinstance(one, RealCameraSettings))
-        named = () if self.projector is None else (self.projector.url,)
+        first = () if self.projector is None else (self.projector,)
+        named = tuple(one.url for one in (*first, *(self.projectors or {}).values()))
         return camera + tuple(url for url in named if not url.startswith("simulated:"))

@@ -22,3 +22,14 @@ def view_number(experiment: Experiment, name: str | None) -> int:
     if name not in names:
         raise BadInputError(f"{experiment.folder.name} has no view {name!r}; its views are {known}.")
     return names.index(name)
+
+
+def camera_number(experiment: Experiment, view: int) -> int:
+    """The number of the view whose camera takes a view's pictures: mostly its own."""
+    owner = experiment.settings.scene.views[view].camera_of
+    return view if owner is None else view_names(experiment).index(owner)
+
+
+def take_turns(experiment: Experiment) -> bool:
+    """Whether one camera takes the pictures of several views, under one projector after the other."""
+    return any(view.camera_of is not None for view in experiment.settings.scene.views)

@@ -14,6 +14,7 @@ from app.experiment.plan import (
     PlacesLine,
     Plan,
     PresetLine,
+    SecondLightLine,
     SeenLine,
     ViewLine,
 )
@@ -35,9 +36,10 @@ from core.plan.choice import Choice
 from core.plan.expected import ExpectedFlow, expected_flow
 from core.plan.observability import seen
 from core.plan.places import place_map
+from core.plan.second_light import SecondLight, second_light
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import Signal, other_light, shift_map, signal
-from core.plan.verdicts import blindness, broken, in_short, moving, verdict
+from core.plan.verdicts import blindness, broken, in_short, moving, offered, verdict
 from core.problem import Problem
 from core.scene import Scene
 from core.view_frame import facing, turn_of
@@ -58,6 +60,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
     signals = signals_of(problem, flow)
     on_stage("what the views determine")
     determined = seen(problem, flow, signals)
+    further = second_light(problem.scene, flow, signals[0], determined)
     on_stage("signal from other places of the camera")
     places = [_places(problem, n, flow) for n in range(len(signals))]
     on_stage("judge the choices")
@@ -76,6 +79,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
             images=determined.images,
             boundary=determined.boundary,
             both=determined.both,
+            second_light=None if further is None else _second_light_line(further),
         ),
         averaging=_averaging(flow.fluctuation),
         choices=[_choice_line(choice) for choice in choices],
@@ -88,6 +92,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
                 for n, (s, view) in enumerate(zip(signals, views, strict=True))
             ),
             blindness(determined, [view.name for view in problem.scene.views]),
+            *offered(further),
             *moving(flow.fluctuation),
             *broken(choices),
         ],
@@ -100,6 +105,12 @@ def stated_problem(experiment: Experiment) -> Problem:
     """The problem without its measurements: scene, planes, sensors."""
     known = known_of(experiment)
     return Problem(known.scene, (), known.planes, known.sensors)
+
+
+def _second_light_line(found: SecondLight) -> SecondLightLine:
+    return SecondLightLine(
+        position_m=list(found.position_m), images=found.images, twice_the_frames=found.twice_the_frames
+    )
 
 
 def departure_k(flow: ExpectedFlow) -> float:

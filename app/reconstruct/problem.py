@@ -66,16 +66,20 @@ def _with_bundle(scene: Scene, bundle: Bundle) -> tuple[Scene, str]:
 
 def _calibrated_view(scene: Scene, number: int, bundle: Bundle) -> View:
     """A view by what was calibrated with its own camera. A further one that shares the scene's projector then has a
-    light of its own: that projector as its camera placed it.
+    light of its own: that projector as its camera placed it. What was not calibrated of a view that another one's
+    camera takes is that one's.
     """
     view = scene.views[number]
     own, response = bundle.of(view.name, number == 0), bundle.response(view.name)
+    camera = view.name if own.cameras or view.camera_of is None else view.camera_of
+    if response is None and view.camera_of is not None:
+        response = bundle.response(view.camera_of)
     light = view.light
     if number > 0 and own.projector is not None:
         light = scene.light if light is None else light
     light = None if light is None else _lit(light, own.projector)
     noise = response.noise if response else view.noise
-    return replace(view, camera=bundle.camera(view.name).optics, noise=noise, light=light)
+    return replace(view, camera=bundle.camera(camera).optics, noise=noise, light=light)
 
 
 def _lit(light: Light, projector: CalibratedOptics | None) -> Light:

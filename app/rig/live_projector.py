@@ -104,6 +104,10 @@ class LiveProjector:
         self._ask(projector, source)
         return self._report
 
+    def held(self, source: str) -> Projector | None:
+        """The projector itself, where it is that of this experiment: its line is this one's."""
+        return self._projector if self._report.source == source else None
+
     def _run(self, projector: Projector, source: str, stop: threading.Event) -> None:
         while not stop.wait(self._switching_s if self._report.state in SWITCHING else self._idle_s):
             self._ask(projector, source)

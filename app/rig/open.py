@@ -9,6 +9,7 @@ from jaxtyping import Float32
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
 from app.experiment.rig_settings import CameraSettings, SimulatedCameraSettings
+from app.experiment.views import camera_number
 from app.rig.cameras import open_real
 from app.rig.inventory import found_cameras
 from app.rig.practice_room import PracticeRoom
@@ -46,9 +47,10 @@ def open_camera(experiment: Experiment, air: AirState, view: int = 0, moment: in
 def named_camera(experiment: Experiment, view: int = 0) -> CameraSettings:
     """The camera that the experiment names for a view; all are simulated where the first one is.
 
-    Raises BadInputError, with the cameras found, where it names none.
+    A view that another one's camera takes has that one's. Raises BadInputError, with the cameras found, where it
+    names none.
     """
-    rig = experiment.settings.rig
+    rig, view = experiment.settings.rig, camera_number(experiment, view)
     settings = rig.camera
     if view > 0 and settings is not None and not isinstance(settings, SimulatedCameraSettings):
         name = experiment.settings.scene.views[view].name
@@ -78,13 +80,17 @@ def air_of(role: CaptureRole) -> AirState:
     return "moving" if role == "flow" else "still"
 
 
-def open_projector(experiment: Experiment) -> Projector:
-    """Return the experiment's projector; its line opens when it is first asked. Raises BadInputError."""
-    settings = experiment.settings.rig.projector
+def open_projector(experiment: Experiment, view: int = 0) -> Projector:
+    """Return the projector of a view; its line opens when it is first asked. Raises BadInputError."""
+    rig, name = experiment.settings.rig, experiment.settings.scene.views[view].name
+    settings = rig.projector if view == 0 else (rig.projectors or {}).get(name)
     if settings is None:
+        whose, table = (
+            ("", "[rig.projector]") if view == 0 else (f" for {name!r}", f'[rig.projectors."{name}"]')
+        )
         raise BadInputError(
-            f"The rig of {experiment.folder.name} names no projector. Add to its experiment.toml: "
-            '[rig.projector] with url = "pjlink://ADDRESS" or "escvp21:/dev/ttyUSB0".'
+            f"The rig of {experiment.folder.name} names no projector{whose}. Add to its experiment.toml: "
+            f'{table} with url = "pjlink://ADDRESS" or "escvp21:/dev/ttyUSB0".'
         )
     return _twin(settings.url) if settings.url.startswith("simulated:") else open_real_projector(settings.url)
 

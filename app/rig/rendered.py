@@ -11,6 +11,7 @@ from jaxtyping import Float, Float32
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
 from app.experiment.rig_settings import SimulatedCameraSettings
+from app.experiment.views import camera_number
 from app.rig.beyond_wall import in_frame, in_room, with_marks
 from app.rig.nuisances import Back, spoiled
 from app.volume.file import RoomVolume, read_volume
@@ -21,7 +22,7 @@ from core.geometry import Box, rotation_matrix, rotation_vector
 from core.rays.visibility import first_hit, wall_points
 from core.render import render_flow, render_reference
 from core.scene import ProjectedPattern, Scene
-from core.view_frame import facing, field_facing, turn_of
+from core.view_frame import each_alone, facing, field_facing, turn_of
 
 # Seeds of one view after those of another: each camera has noise and a mount of its own.
 VIEWS_APART = 7919
@@ -70,15 +71,15 @@ def moving_pictures(
 
 
 def _mounted(experiment: Experiment, settings: SimulatedCameraSettings, view: int, steps: int) -> Scene:
-    """The scene after so many steps of the mount."""
-    scene = _as_it_is(experiment, settings)
+    """The scene after so many steps of the mount; views that one camera takes stand on one mount."""
+    scene, mount = _as_it_is(experiment, settings), camera_number(experiment, view)
     for step in range(steps):
         scene = drifted(
             scene,
             view,
             settings.drift_px,
             settings.world.breathing_px,
-            settings.seed + step + VIEWS_APART * view,
+            settings.seed + step + VIEWS_APART * mount,
         )
     return scene
 
@@ -115,7 +116,7 @@ def _rendered(
     image = render_reference(scene, view) if field is None else render_flow(scene, field, view)
     # What stands in the room, whether or not the scene states it.
     stated, turned = view, None if field is None else field_facing(field, turn_of(scene, view))
-    scene, view = facing(replace(scene, objects=room_objects(volume)), view)
+    scene, view = facing(each_alone(replace(scene, objects=room_objects(volume))), view)
     # Prints keep their size when the lens breathes.
     focal_px = experiment.settings.scene.views[stated].camera.focal_px[0]
     if settings.border == "print":

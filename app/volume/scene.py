@@ -64,7 +64,8 @@ class RigOptions:
 
     The picture reaches `border_px` beyond the wall at least, which windows need and single pixels do not. `walls` are
     patterned, each with a camera before it, and with a print or projector of its own. With `marks`, two still boards
-    near each camera stand in the upper corners of its picture.
+    near each camera stand in the upper corners of its picture. `further_projectors_m` light the first wall in turn
+    with the first projector, for the same camera: minus camera (x, z), as `baseline_m`.
     """
 
     camera_px: tuple[int, int] = (4096, 3072)
@@ -78,6 +79,7 @@ class RigOptions:
     border_px: int = BORDER_PX
     walls: tuple[WallName, ...] = ("y_max",)
     marks: bool = False
+    further_projectors_m: tuple[Vector2, ...] = ()
 
     def __post_init__(self) -> None:
         if self.frames < 1 or self.full_well_e <= 0 or min(self.camera_px) < 16:
@@ -88,6 +90,11 @@ class RigOptions:
         if not self.walls or len(set(self.walls)) < len(self.walls):
             raise BadInputError(
                 f"The views look at {', '.join(self.walls) or 'no wall'}; expected each wall once, and one at least."
+            )
+        if self.further_projectors_m and self.light != "projector":
+            raise BadInputError(
+                "A further projector lights the wall in turn with a first one, and this wall has a print. Take the "
+                "light 'projector'."
             )
 
 
@@ -100,6 +107,7 @@ def room_scene(volume: RoomVolume, options: RigOptions, information: Information
             "above 0."
         )
     views = tuple(_view(room, options, number) for number in range(len(options.walls)))
+    views += tuple(_in_turn(room, views[0], options, n) for n in range(len(options.further_projectors_m)))
     # A view of another wall has its own light; the scene's is then nobody's.
     light = views[0].light or _light(room, views[0].camera, options)
     return Scene(
@@ -134,6 +142,17 @@ def _view(room: Box, options: RigOptions, number: int) -> View:
         frames=options.frames,
         marks=_boards(options.camera_px) if options.marks else (),
     )
+
+
+def _in_turn(room: Box, first: View, options: RigOptions, number: int) -> View:
+    """The first view under a further projector, which throws another pattern."""
+    turn = turn_to(first.wall)
+    seed = options.pattern_seed + len(options.walls) + number
+    own = replace(options, baseline_m=options.further_projectors_m[number], pattern_seed=seed)
+    light = _light(turn.box(room), turn.optics(first.camera), own)
+    if isinstance(light, ProjectedPattern) and not turn.is_none:
+        light = replace(light, projector=turn.back().optics(light.projector))
+    return replace(first, name=f"{first.name}, light {number + 2}", light=light, camera_of=first.name)
 
 
 def _boards(size_px: tuple[int, int]) -> tuple[Marks, ...]:

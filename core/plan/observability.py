@@ -17,6 +17,7 @@ from core.plan.expected import ExpectedFlow
 from core.plan.signal import Signal
 from core.problem import Problem
 from core.rays.operator import build
+from core.scene import Scene
 
 _SHAPE = (11, 7, 10)
 # Correlation length of the prior, in parts of each edge of the room.
@@ -34,36 +35,38 @@ class Seen:
     both: float
     # What the images of the first view, of the first two, and so on fix.
     first_views: tuple[float, ...]
+    # What each view says of the modes, over its noise.
+    rows: tuple[Float[np.ndarray, "rows size"], ...] = ()
 
 
 def seen(problem: Problem, flow: ExpectedFlow, signals: tuple[Signal, ...]) -> Seen:
     """How much of an unknown temperature of the expected size the images and the boundary determine."""
-    scene = problem.scene
-    grid = VertexGrid(scene.room, _SHAPE)
-    departure = flow.excess_k - flow.excess_k.mean(axis=(0, 1))
-    root = _prior_root(grid) * max(float(departure.std()), 1e-9)
-    size = len(root)
-    per_k = scene.air.ambient_refractivity / scene.air.ambient_temperature_k
-    rows = []
-    for view, found in enumerate(signals):
-        operator = build(scene, view, found.shift.centres_px, _SHAPE, float(found.noise.window_px))
-        matrix = np.asarray(_columns(operator, size))
-        whitened = matrix.transpose(1, 2, 0) / np.array(found.noise.std_px)[None, :, None]
-        rows.append(whitened.reshape(-1, size) * (-per_k * found.shift.stride))
-    rows = [row @ root for row in rows]
+    root = prior_root(problem.scene, flow)
+    rows = [rows_of(problem.scene, view, flow, found) @ root for view, found in enumerate(signals)]
     images = np.concatenate(rows)
-    share = _share(images, root)
-    first_views = tuple(_share(np.concatenate(rows[:n]), root) for n in range(1, len(rows)))
-    known = _known_rows(problem, grid) @ root
+    share = share_of(images, root)
+    first_views = tuple(share_of(np.concatenate(rows[:n]), root) for n in range(1, len(rows)))
+    known = _known_rows(problem, VertexGrid(problem.scene.room, _SHAPE)) @ root
     values = np.linalg.svd(images, compute_uv=False)
     return Seen(
-        size,
+        len(root),
         int(np.sum(values > 1.0)),
         share,
-        _share(known, root),
-        _share(np.concatenate([images, known]), root),
+        share_of(known, root),
+        share_of(np.concatenate([images, known]), root),
         (*first_views, share),
+        tuple(rows),
     )
+
+
+def rows_of(scene: Scene, view: int, flow: ExpectedFlow, found: Signal) -> Float[np.ndarray, "rows size"]:
+    """What one view's windows say of the temperature at the grid's vertices, each over its deviation [1/K]."""
+    per_k = scene.air.ambient_refractivity / scene.air.ambient_temperature_k
+    operator = build(scene, view, found.shift.centres_px, _SHAPE, float(found.noise.window_px))
+    size = int(np.prod(_SHAPE))
+    matrix = np.asarray(_columns(operator, size))
+    whitened = matrix.transpose(1, 2, 0) / np.array(found.noise.std_px)[None, :, None]
+    return whitened.reshape(-1, size) * (-per_k * found.shift.stride)
 
 
 def _columns(operator, size: int):
@@ -74,14 +77,15 @@ def _columns(operator, size: int):
     return jax.lax.map(operator.apply, basis)
 
 
-def _prior_root(grid: VertexGrid) -> Float[np.ndarray, "size size"]:
-    """L with L L^T the separable Gaussian covariance of unit variance."""
+def prior_root(scene: Scene, flow: ExpectedFlow) -> Float[np.ndarray, "size size"]:
+    """L with L L^T the separable Gaussian covariance of the expected departures' variance [K]."""
     factors = []
-    for n in grid.shape:
+    for n in VertexGrid(scene.room, _SHAPE).shape:
         apart = np.subtract.outer(np.linspace(0, 1, n), np.linspace(0, 1, n))
         covariance = np.exp(-0.5 * (apart / _LENGTH) ** 2) + 1e-6 * np.eye(n)
         factors.append(np.linalg.cholesky(covariance))
-    return np.kron(np.kron(factors[0], factors[1]), factors[2])
+    departure = flow.excess_k - flow.excess_k.mean(axis=(0, 1))
+    return np.kron(np.kron(factors[0], factors[1]), factors[2]) * max(float(departure.std()), 1e-9)
 
 
 def _known_rows(problem: Problem, grid: VertexGrid) -> Float[np.ndarray, "known size"]:
@@ -96,7 +100,7 @@ def _known_rows(problem: Problem, grid: VertexGrid) -> Float[np.ndarray, "known 
     return np.concatenate(rows)
 
 
-def _share(rows: np.ndarray, root: np.ndarray) -> float:
+def share_of(rows: np.ndarray, root: np.ndarray) -> float:
     """Share of the prior's variance that measurements with these whitened rows remove."""
     if not len(rows):
         return 0.0

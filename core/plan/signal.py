@@ -17,6 +17,7 @@ from core.rays.operator import build
 from core.rays.visibility import sees_wall
 from core.scene import FixedTexture, ProjectedPattern, Scene
 from core.setting import SettingError
+from core.view_frame import each_alone
 
 # A flow is visible if the 99th percentile of its shift is three standard deviations of a window.
 VISIBLE = 3.0
@@ -98,6 +99,7 @@ def shift_map(scene: Scene, view: int, flow: ExpectedFlow, window_px: int) -> Sh
 
 def other_light(scene: Scene, view: int) -> Scene:
     """The same scene under the other kind of light: a print, or a projector one metre beside the camera."""
+    scene = each_alone(scene)
     if isinstance(scene.light, ProjectedPattern):
         return replace(scene, light=FixedTexture(pattern=scene.light.pattern))
     camera = scene.views[view].camera

@@ -9,6 +9,7 @@ from core.plan.averaging import Fluctuation
 from core.plan.choice import Choice
 from core.plan.expected import ExpectedFlow
 from core.plan.observability import Seen
+from core.plan.second_light import SecondLight
 from core.plan.signal import VISIBLE, Signal, lever_m
 from core.rays.visibility import hidden_by_objects, sees_wall
 from core.scene import ProjectedPattern, Scene
@@ -130,6 +131,18 @@ def _added(found: Seen, names: Sequence[str]) -> str:
     said = [f"{names[0]!r} alone fixes {100 * alone:.0f} %"]
     said += [f"with {name!r} it is {100 * share:.0f} %" for name, share in zip(names[1:], more, strict=True)]
     return f"Of an unknown flow's variance {', '.join(said)}. "
+
+
+def offered(found: SecondLight | None) -> list[str]:
+    """A second projector, where it would find more than the frames that it takes; nothing elsewhere."""
+    if found is None or not found.helps:
+        return []
+    x, y, z = found.position_m
+    return [
+        f"A second projector at ({x:.1f}, {y:.1f}, {z:.1f}) m, on the other side of the camera, that lights the same "
+        f"wall in turn would raise what the images fix to {100 * found.images:.0f} %; as many frames under the one "
+        f"that is there, to {100 * found.twice_the_frames:.0f} %. State it as a view with camera_of."
+    ]
 
 
 def moving(air: Fluctuation | None) -> list[str]:

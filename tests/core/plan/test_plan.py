@@ -10,9 +10,10 @@ from core.displacement import measure_shift
 from core.plan.choices import resolve
 from core.plan.expected import expected_flow
 from core.plan.observability import seen
+from core.plan.second_light import second_light
 from core.plan.shift_noise import shift_noise
 from core.plan.signal import signal
-from core.plan.verdicts import in_short, verdict
+from core.plan.verdicts import in_short, offered, verdict
 from core.problem import Problem
 from core.render import render_flow, render_reference
 from core.scene import Inlet, Outlet, Patch, Scene, Wall
@@ -94,6 +95,21 @@ def test_a_projector_in_the_cameras_place_sees_nothing():
     _, flow, found = planned(scene)
     assert found.shift.percentile_px(100) < 1e-6
     assert "exactly no shift" in verdict(scene, 0, flow, found, 1.0)
+
+
+def test_a_second_projector_is_offered_where_it_finds_more_than_its_frames_would():
+    problem, flow, found = planned(bench(baseline_m=1.0, width_px=128))
+    determined = seen(problem, flow, (found,))
+    light = second_light(problem.scene, flow, found, determined)
+    assert light is not None
+    # The projector stands 1 m to the right of a camera at x = 1.5 m.
+    np.testing.assert_allclose(light.position_m, (0.5, -9.0, 1.5), atol=1e-9)
+    assert determined.images < light.twice_the_frames < light.images < 1
+    (sentence,) = offered(light)
+    assert f"fix to {100 * light.images:.0f} %" in sentence
+    # Where the air is seen so well that nothing is left to find, or the wall is printed, nothing is offered.
+    assert offered(replace(light, images=light.twice_the_frames)) == []
+    assert second_light(bench(width_px=128), flow, found, determined) is None
 
 
 def test_what_one_view_sees_grows_with_the_light_it_collects():

@@ -1,0 +1,53 @@
+"""Projectors that light one wall in turn, for one camera: all are dark but that of the view whose turn it is.
+
+Each shows its own pattern all the time; dark is its own "mute", which blanks the picture and leaves the lamp.
+"""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, closing
+
+from app.errors import AirlensError
+from app.experiment.folder import Experiment
+from app.experiment.views import camera_number, view_names
+from app.rig.open import open_projector
+from drivers.projector.protocol import Projector
+
+# Opens the projector of a view, by its number.
+OpensProjector = Callable[[int], AbstractContextManager[Projector]]
+
+
+class Lamps:
+    """The projectors of one experiment; `opens` speaks to them, by default each on a line of its own."""
+
+    def __init__(self, experiment: Experiment, opens: OpensProjector | None = None) -> None:
+        self._experiment = experiment
+        self._opens = opens or (lambda view: closing(open_projector(experiment, view)))
+
+    def light(self, view: int) -> None:
+        """Let the view's projector alone light its wall; nothing where its camera sees no other.
+
+        A simulated rig lights each picture as its view states. Raises BadInputError for a projector that the rig does
+        not name, AirlensError for one that does not do as it is told, DeviceError.
+        """
+        if self._experiment.settings.rig.camera_kind == "simulated":
+            return
+        owner = camera_number(self._experiment, view)
+        numbers = range(len(view_names(self._experiment)))
+        turns = [n for n in numbers if camera_number(self._experiment, n) == owner]
+        if len(turns) < 2:
+            return
+        for number in (*(n for n in turns if n != view), view):
+            self._mute(number, number != view)
+
+    def _mute(self, number: int, dark: bool) -> None:
+        name = view_names(self._experiment)[number]
+        with self._opens(number) as projector:
+            projector.mute(dark)
+            muted = projector.status().muted
+        if muted is not dark:
+            said = {True: "it is dark", False: "it shows its picture", None: "it does not tell"}[muted]
+            raise AirlensError(
+                f"The projector of {name!r} was told to {'be dark' if dark else 'show its picture'}, and {said}. One "
+                "camera sees several projectors in turn, so each must be on and know mute. Check it: airlens "
+                "projector status ADDRESS."
+            )
