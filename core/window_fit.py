@@ -1,12 +1,12 @@
 """One window of two pictures: least squares for its shift, free of what noise and lamps do to it.
 
-    I_flow - I_ref = -d . grad I + (a + b . x + x . C x + D xxx) I + c + noise,        I = (I_ref + I_flow) / 2
+    I_flow - I_ref = -d . grad I + (a + b . x + x . C x) I + c + noise,        I = (I_ref + I_flow) / 2
 
-The gain may vary over the window to third order (a, b, C, D): a lamp that ripples looks like a shift otherwise. C and
-D are as small as a ripple is expected to be, so that small windows lose little by them. The picture's gradient
-carries noise of its own, of known variance s^2 |taps|^2 / 4 a pixel, which is taken out of the normal matrix: dim
-pictures would show shifts too small (Fuller, Measurement Error Models, 1987, section 1.2). What is left beyond the
-noise (a chi-squared above 1) counts as noise: the information is divided by it (Birge's ratio).
+The gain may vary over the window to second order (a, b, C): a lamp that ripples looks like a shift otherwise. C is
+as small as a ripple is expected to be, so that small windows lose little by it. The picture's gradient carries noise
+of its own, of known variance s^2 |taps|^2 / 4 a pixel, which is taken out of the normal matrix: dim pictures would
+show shifts too small (Fuller, Measurement Error Models, 1987, section 1.2). What is left beyond the noise (a chi-
+squared above 1) counts as noise: the information is divided by it (Birge's ratio).
 """
 
 import equinox as eqx
@@ -14,13 +14,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy import ndimage
 
-# Rows of a window's matrix of products: d column, d row; gain, its two slopes, three second and four third orders,
-# offset; the pictures' difference.
-_SHIFT, _GAIN, _NUISANCE, _OFFSET, _DIFFERENCE = slice(0, 2), 2, slice(2, 13), 12, 13
+# Rows of a window's matrix of products: d column, d row; gain, its two slopes and three second orders, offset; the
+# pictures' difference.
+_SHIFT, _NUISANCE, _DIFFERENCE = slice(0, 2), slice(2, 9), 9
 # A window without texture tells nothing: its displacement is 0 with this much information.
 _LEAST_INFORMATION_PER_PX2 = 1e-6
-# One sigma of the light's ripple: its share, and its wave number (a period of 60 px).
-_RIPPLE, _RIPPLE_PER_PX = 0.01, 2 * np.pi / 60
+# One sigma of the light's curvature: a ripple of 1 % with a period of 60 px.
+_CURVATURE_PER_PX2 = 1e-4
 # A texture's gradient must stand so many deviations above that of noise.
 _SEEN = 4.0
 
@@ -67,23 +67,22 @@ def window_products(
     slopes: tuple[Float[np.ndarray, "windows px px"], Float[np.ndarray, "windows px px"]],
     mean: Float[np.ndarray, "windows px px"],
     difference: Float[np.ndarray, "windows px px"],
-) -> Float[np.ndarray, "windows 14 14"]:
-    """Sums over a window of the products of its fourteen pictures: the sufficient statistics of the fit."""
+) -> Float[np.ndarray, "windows 10 10"]:
+    """Sums over a window of the products of its ten pictures: the sufficient statistics of the fit."""
     windows, px, _ = mean.shape
     x = (np.arange(px) - (px - 1) / 2) / px
     y = x[:, None]
-    pictures = np.empty((windows, _DIFFERENCE + 1, px, px))
+    pictures = np.empty((windows, 10, px, px))
     pictures[:, 0], pictures[:, 1], pictures[:, 2] = slopes[0], slopes[1], mean
-    orders = (x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y)
-    for n, shape in enumerate(orders, _GAIN + 1):
+    for n, shape in enumerate((x, y, x * x, x * y, y * y), 3):
         pictures[:, n] = mean * shape
-    pictures[:, _OFFSET], pictures[:, _DIFFERENCE] = 1.0, difference
-    flat = pictures.reshape(windows, _DIFFERENCE + 1, px * px)
+    pictures[:, 8], pictures[:, 9] = 1.0, difference
+    flat = pictures.reshape(windows, 10, px * px)
     return flat @ flat.transpose(0, 2, 1)
 
 
 def fit_windows(
-    products: Float[np.ndarray, "windows 14 14"], variance: Float[np.ndarray, " windows"], pixels: int
+    products: Float[np.ndarray, "windows 10 10"], variance: Float[np.ndarray, " windows"], pixels: int
 ) -> WindowFit:
     """The fit of every window of `pixels`; `variance` is that of a pixel of the difference."""
     products = products / variance[:, None, None]
@@ -113,21 +112,15 @@ def fit_windows(
         information + _LEAST_INFORMATION_PER_PX2 * np.eye(2),
         chi_squared,
         gain=(2 + gain) / (2 - gain),
-        contrast=np.maximum(
-            products[:, _GAIN, _GAIN] - products[:, _GAIN, _OFFSET] ** 2 / products[:, _OFFSET, _OFFSET], 0.0
-        )
-        / pixels,
+        contrast=np.maximum(products[:, 2, 2] - products[:, 2, 8] ** 2 / products[:, 8, 8], 0.0) / pixels,
     )
 
 
 def _known_of_gain(pixels: int) -> Float[np.ndarray, " nuisances"]:
-    """What is known beforehand of each nuisance (1 / variance): of the gain's second and third orders alone.
-
-    Coordinates are in windows. A wave A sin(k . x) has the terms A (k . x)^2 / 2 and A (k . x)^3 / 6.
-    """
-    turn = _RIPPLE_PER_PX * pixels**0.5
-    second, third = (_RIPPLE * turn**2 / 2) ** -2, (_RIPPLE * turn**3 / 6) ** -2
-    return np.array([0, 0, 0, second, second / 4, second, third, third / 9, third / 9, third, 0])
+    """What is known beforehand of each nuisance (1 / variance): of the gain's second order alone."""
+    # Coordinates are in windows: a square term is half of the curvature.
+    square = (0.5 * _CURVATURE_PER_PX2 * pixels) ** -2
+    return np.array([0.0, 0.0, 0.0, square, 0.25 * square, square, 0.0])
 
 
 def _without_noise(
