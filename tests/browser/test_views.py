@@ -57,6 +57,22 @@ def test_a_camera_that_failed_is_taken_alone_and_all_are_seen_and_taken_at_once(
     snapshot(page, "views-lost")
     lost.get_by_role("button", name=f"Connect {VIEWS[1]}").click()
     expect(lost.locator("canvas")).to_have_attribute("data-frames", re.compile(r"\d+"))
+    # The shift by the camera that is chosen, and exposure and gain of that one alone.
+    page.get_by_label("by the camera of").select_option(VIEWS[1])
+    with page.expect_response(lambda one: "/devices/camera/shift?view=1" in one.url) as asked:
+        page.get_by_label("Shift since the reference").check()
+    assert asked.value.ok
+    page.get_by_label("Shift since the reference").uncheck()
+    cameras = station.app.state.services.cameras
+    before_s = cameras.of(0).status.exposure_s
+    go_to(page, "Rig")
+    page.get_by_label("View").select_option(f"{VIEWS[1]}: wall x_max")
+    page.get_by_label("Exposure [ms]").fill("33.333")
+    page.get_by_role("button", name="Set", exact=True).click()
+    expect(page.locator("section.side")).to_contain_text("33.333 ms")
+    assert cameras.of(1).status.exposure_s == pytest.approx(0.033333)
+    assert cameras.of(0).status.exposure_s == before_s
+    snapshot(page, "views-rig")
     assert watched.complaints == []
 
 
