@@ -328,13 +328,7 @@ def from_json(text: str, source: str = "bundle.json") -> Bundle:
     Raises:
         BundleError: not JSON, an unknown or missing key, a wrong type, another schema.
     """
-    try:
-        content: Any = json.loads(text)
-    except ValueError as error:
-        raise BundleError(
-            f"{source} is not JSON ({error}). Restore it from its copy, or calibrate again."
-        ) from error
-    return strict.decode(Bundle, content, source)
+    return strict.from_json(Bundle, text, source, "Restore it from its copy, or calibrate again.")
 
 
 def _matrix(rows: Rows | None) -> Float[np.ndarray, "15 15"]:

@@ -114,8 +114,4 @@ def record_from_json(text: str, source: str) -> Record:
     Raises:
         BundleError: not JSON, an unknown or missing key, a wrong type.
     """
-    try:
-        content = json.loads(text)
-    except ValueError as error:
-        raise BundleError(f"{source} is not JSON ({error}). Remove it and calibrate again.") from error
-    return strict.decode(Record, content, source)
+    return strict.from_json(Record, text, source, "Remove it and calibrate again.")

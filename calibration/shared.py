@@ -8,7 +8,6 @@ import json
 from dataclasses import dataclass, replace
 
 from calibration import strict
-from calibration.errors import BundleError
 from calibration.record import SeenBoard
 
 
@@ -47,8 +46,4 @@ def shared_from_json(text: str, source: str) -> SharedRecord:
     Raises:
         BundleError: not JSON, an unknown or missing key, a wrong type.
     """
-    try:
-        content = json.loads(text)
-    except ValueError as error:
-        raise BundleError(f"{source} is not JSON ({error}). Remove it and take the boards again.") from error
-    return strict.decode(SharedRecord, content, source)
+    return strict.from_json(SharedRecord, text, source, "Remove it and take the boards again.")

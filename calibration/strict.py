@@ -6,6 +6,7 @@ dataclasses, and any of these or None.
 
 import dataclasses
 import difflib
+import json
 import math
 import types
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -52,6 +53,19 @@ def decode(cls: type[T], content: Any, where: str) -> T:
         raise
     except ValueError as error:
         raise BundleError(f"{where}: {error}") from error
+
+
+def from_json(cls: type[T], text: str, source: str, remedy: str) -> T:
+    """Build the dataclass `cls` from JSON text; `source` names it in messages, and `remedy` says what to do.
+
+    Raises:
+        BundleError: not JSON, an unknown or missing key, a wrong type.
+    """
+    try:
+        content = json.loads(text)
+    except ValueError as error:
+        raise BundleError(f"{source} is not JSON ({error}). {remedy}") from error
+    return decode(cls, content, source)
 
 
 def _value(hint: Any, item: Any, where: str) -> Any:

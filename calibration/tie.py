@@ -74,7 +74,7 @@ def tie(seats: tuple[Seat, ...], shared: tuple[SharedBoard, ...]) -> Tied:
         moved.append(worst)
         shared = tuple(board for board in shared if board.name != worst)
     of_shared = [
-        residual for number in draft.shared.values() for residual in _of_view(draft, adjusted, number)
+        residual for number in draft.shared.values() for _, residual in _of_view(draft, adjusted, number)
     ]
     rms_px = float(np.sqrt(np.mean(np.concatenate(of_shared) ** 2) * 2)) if of_shared else 0.0
     return Tied(
@@ -259,33 +259,24 @@ def _motion_of(placed: Pose | Device) -> Motion:
     return motion
 
 
-def _of_view(draft: _Draft, adjusted: Adjusted, view: int) -> Iterator[np.ndarray]:
-    """The residuals of all that was seen of one board."""
+def _of_view(draft: _Draft, adjusted: Adjusted, view: int) -> Iterator[tuple[Sighting, np.ndarray]]:
+    """All that was seen of one board, with its residuals [px]."""
     for sighting, residual in zip(draft.sightings, adjusted.residuals_px, strict=True):
         if sighting.view == view:
-            yield residual
+            yield sighting, residual
 
 
 def _worst(draft: _Draft, adjusted: Adjusted) -> str | None:
     """The shared board that fits least, where it does not fit at all."""
-    weighted = [
-        residual / adjusted.devices[sighting.device].sigma_px
-        for sighting, residual in zip(draft.sightings, adjusted.residuals_px, strict=True)
-    ]
-    # sigma_px is of a point's distance, which is the root of two coordinates' variance.
-    rms = {
-        name: float(
-            np.sqrt(
-                2
-                * np.mean(
-                    np.concatenate(
-                        [w for w, s in zip(weighted, draft.sightings, strict=True) if s.view == view]
-                    )
-                    ** 2
-                )
-            )
-        )
-        for name, view in draft.shared.items()
-    }
+
+    def rms_of(view: int) -> float:
+        # sigma_px is of a point's distance, which is the root of two coordinates' variance.
+        weighted = [
+            np.sqrt(2.0) * residual / adjusted.devices[sighting.device].sigma_px
+            for sighting, residual in _of_view(draft, adjusted, view)
+        ]
+        return float(np.sqrt(np.mean(np.concatenate(weighted) ** 2)))
+
+    rms = {name: rms_of(view) for name, view in draft.shared.items()}
     worst = max(rms, key=lambda name: rms[name], default=None)
     return None if worst is None or rms[worst] <= MOVED else worst

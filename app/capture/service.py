@@ -22,7 +22,7 @@ from app.capture.watched import BurstWatch, OnAbort
 from app.errors import AirlensError
 from app.experiment.folder import Experiment, new_id
 from app.experiment.recorder import release, reserve
-from app.experiment.views import camera_number
+from app.experiment.views import opened_for
 from app.live.beside import LiveAir
 from app.rig.conditions import Conditions
 from app.rig.lamps import Lamps
@@ -297,7 +297,7 @@ class CaptureDesk:
     def _using(self, run: _Run, view: int) -> Iterator[Camera]:
         """Hold the camera of a view, opened unless it is; a simulated room is told what its air does."""
         simulated = run.experiment.settings.rig.camera_kind == "simulated"
-        view = view if simulated else camera_number(run.experiment, view)
+        view = opened_for(run.experiment, view)
         source, air, live = run.experiment.folder.name, air_of(run.plan.role), self._live.of(view)
         wanted = (source, air if simulated else live.air)
         again = live.status.state.value != "ready" or (live.status.experiment, live.air) != wanted

@@ -12,7 +12,7 @@ from app.capture.start_together import StartTogether
 from app.capture.watched import BurstWatch, run_watched
 from app.errors import AirlensError
 from app.experiment.folder import Experiment
-from app.experiment.views import camera_number, view_names
+from app.experiment.views import opened_for, view_names
 from app.rig.conditions import Conditions, seconds_on
 from app.rig.lamps import Lamps
 from drivers.burst import Burst, BurstOutcome, CapturePlan, Progress
@@ -143,10 +143,7 @@ class ViewCapture:
     @contextmanager
     def _alone(self, number: int) -> Iterator[Camera]:
         """The camera of a view; where it cannot be opened beside the first one, that one rests meanwhile."""
-        if (
-            self.experiment.settings.rig.camera_kind != "simulated"
-            and camera_number(self.experiment, number) == 0
-        ):
+        if opened_for(self.experiment, number) == 0:
             yield self.camera
             return
         with ExitStack() as stack:

@@ -30,6 +30,12 @@ def camera_number(experiment: Experiment, view: int) -> int:
     return view if owner is None else view_names(experiment).index(owner)
 
 
+def opened_for(experiment: Experiment, view: int) -> int:
+    """The number of the view whose camera is opened for a view: a simulated rig has a twin for each."""
+    simulated = experiment.settings.rig.camera_kind == "simulated"
+    return view if simulated else camera_number(experiment, view)
+
+
 def take_turns(experiment: Experiment) -> bool:
     """Whether one camera takes the pictures of several views, under one projector after the other."""
     return any(view.camera_of is not None for view in experiment.settings.scene.views)

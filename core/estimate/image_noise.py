@@ -1,13 +1,15 @@
 """The noise of the shifts, as the shifts themselves show it.
 
-Along a ray that leaves the camera towards theta, air deflects light by the integral of t dn/dr over the way t, which
-is the gradient in theta of the integral of n. So a picture of shifts is the gradient of one number a place: it has no
-curl. A sensor's noise and a lamp that ripples have as much curl as divergence. So the part of the shifts that is no
-gradient says how large their noise is, whatever the air does.
+Along a ray that leaves the camera towards theta, air deflects light by the integral of t dn/dr over the way t. That
+is the gradient in theta of one number for each ray, the integral of n. So shifts that air causes are a gradient over
+the picture and have no curl, while the errors of a sensor or of a rippling lamp have as much curl as divergence. The
+part of the shifts that is no gradient therefore says how large their noise is, whatever the air does.
 
 What a room predicts is taken off first: shifts grow towards the wall's end of the ray, so a wide lens before a near
 wall sees a gradient that is slightly bent. Of what a room leaves that is small.
 """
+
+from collections.abc import Iterator
 
 import equinox as eqx
 import numpy as np
@@ -52,44 +54,45 @@ def images(data: Observations, fields: RoomFields) -> Images:
     shown = group == IMAGES
     values, predicted = (unshared(data, of[shown]) for of in (values, data.predicted(fields)))
     variance = variance[shown].copy()
-    doubt, start = 0.0, 0
-    for blocks in data.shifts:
-        own = slice(start, start + blocks.displacement_px.size)
-        left = (values - predicted)[own].reshape(-1, 2)
-        factor, known = noise_factor(blocks, left)
+    doubt = 0.0
+    for blocks, own in _views(data):
+        factor, known = noise_factor(blocks, (values - predicted)[own].reshape(-1, 2))
         variance[own] *= factor
         doubt += (known * float(variance[own].sum())) ** 2
-        start = own.stop
     return Images(values, predicted, variance, doubt**0.5 / max(float(variance.sum()), _TINY))
 
 
 def with_noise_seen(data: Observations, fields: RoomFields) -> Observations:
     """The data, their images' noise as what these fields leave of them shows."""
-    seen, scaled, start = images(data, fields), [], 0
-    for blocks in data.shifts:
-        own = slice(start, start + blocks.displacement_px.size)
+    seen, scaled = images(data, fields), []
+    for blocks, own in _views(data):
         variance = seen.variance_px2[own].reshape(-1, 2)
         scaled.append(eqx.tree_at(lambda of: of.variance_px2, blocks, variance))
-        start = own.stop
     return eqx.tree_at(lambda of: of.shifts, data, tuple(scaled))
 
 
 def unshared(data: Observations, shifts_px: Float[np.ndarray, " shifts"]) -> Float[np.ndarray, " shifts"]:
-    """Shifts of all views without what any size of the errors that windows share would explain of them.
+    """Shifts of all views without the errors that windows share, fitted to them at any size.
 
-    The blocks hold what is unknown of these errors, as large as it may be beside what no grid represents: far more
-    than their noise.
+    `ShiftBlocks.still` leaves a rest of these errors in the blocks, which is larger than the noise: it weighs them
+    against what a grid cannot represent.
     """
-    parts, start = [], 0
-    for blocks in data.shifts:
-        own = shifts_px[start : start + blocks.displacement_px.size]
-        start += own.size
+    rest = shifts_px.copy()
+    for blocks, own in _views(data):
         if blocks.still is not None:
             std = np.sqrt(blocks.variance_px2).ravel()
-            shared, *_ = svd(blocks.still.out.reshape(own.size, -1) / std[:, None], full_matrices=False)
-            own = own - std * (shared @ (shared.T @ (own / std)))
-        parts.append(own)
-    return np.concatenate([np.zeros(0), *parts])
+            shared, *_ = svd(blocks.still.out.reshape(len(std), -1) / std[:, None], full_matrices=False)
+            rest[own] -= std * (shared @ (shared.T @ (shifts_px[own] / std)))
+    return rest
+
+
+def _views(data: Observations) -> Iterator[tuple[ShiftBlocks, slice]]:
+    """Each view's blocks, and where their shifts stand among those of all views."""
+    start = 0
+    for blocks in data.shifts:
+        own = slice(start, start + blocks.displacement_px.size)
+        yield blocks, own
+        start = own.stop
 
 
 def noise_factor(blocks: ShiftBlocks, left_px: Float[np.ndarray, "blocks 2"]) -> tuple[float, float]:
