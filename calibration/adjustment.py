@@ -122,6 +122,21 @@ def adjust(
     return _result(here, free, devices, sightings, iterations, converged)
 
 
+def carried(adjusted: Adjusted, sightings: tuple[Sighting, ...]) -> Float[np.ndarray, "unknowns 9"]:
+    """How the free unknowns of the devices follow the intrinsics of device 0, which were held, to first order.
+
+    Rows as those of the covariance; zero where they are fixed.
+    """
+    devices, boards = adjusted.devices, len(adjusted.poses)
+    known = (replace(devices[0], free=np.ones(9, bool)), *devices[1:])
+    free = _free(known, boards)
+    here = _linearise(_pack(devices, adjusted.poses), devices, sightings)
+    reduced = _schur(here.normal[np.ix_(free, free)], boards)[0]
+    found = np.zeros((_offset(len(devices)), 9))
+    found[np.flatnonzero(free[: len(found)])[9:]] = -np.linalg.solve(reduced[9:, 9:], reduced[9:, :9])
+    return found
+
+
 def _linearise(unknowns: np.ndarray, devices: tuple[Device, ...], sightings: tuple[Sighting, ...]) -> _Point:
     """Residuals (predicted - seen, weighted); each sighting fills only its own block of the normal matrix."""
     now, poses = _unpack(unknowns, devices)

@@ -64,14 +64,14 @@ def build(record: Record) -> Model:
     world = _world(record, state, up)
     camera_optics, projector_optics = _optics(record, state, up, world)
     names = tuple(b.name for b in record.boards)
-    quality = _quality(camera, advise(camera, names, record.camera_size_px), record.camera_size_px)
+    quality = quality_of(camera, advise(camera, names, record.camera_size_px), record.camera_size_px)
     calibrated = CalibratedOptics(record.camera, camera_optics[0], camera_optics[1], quality=quality)
     projector = None
     if pair is not None and projector_optics is not None and record.panel_size_px is not None:
         lit = tuple(b.name for b in record.boards if b.panel_px)
         advice = advise(pair.projector, lit, record.panel_size_px)
         projector = CalibratedOptics(
-            "projector", *projector_optics, quality=_quality(pair.projector, advice, record.panel_size_px)
+            "projector", *projector_optics, quality=quality_of(pair.projector, advice, record.panel_size_px)
         )
     wall = _calibrated_wall(record, state, flat, world)
     return Model(record, camera, pair, flat, state.plane, world, calibrated, projector, wall)
@@ -220,7 +220,8 @@ def _calibrated_wall(
     )
 
 
-def _quality(fit: Intrinsics, advice: tuple[str, ...], size_px: tuple[int, int]) -> Quality:
+def quality_of(fit: Intrinsics, advice: tuple[str, ...], size_px: tuple[int, int]) -> Quality:
+    """How good a device's fit is."""
     share = float(coverage(tuple(s.pixels_px for s in fit.sightings), size_px).mean())
     return Quality("measured", fit.rms_px, len(fit.sightings), share, advice)
 

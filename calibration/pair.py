@@ -46,7 +46,7 @@ def fit_pair(
         replace(s, device=1, view=v) for s, v in zip(alone.sightings, views, strict=True)
     )
     poses = camera.adjusted.poses
-    rotation, translation = _relative([poses[v] for v in views], alone.adjusted.poses)
+    rotation, translation = between([poses[v] for v in views], alone.adjusted.poses)
     devices = (
         replace(camera.device, sigma_px=camera.rms_px),
         replace(alone.device, rotation_rad=rotation, translation_m=translation, sigma_px=alone.rms_px),
@@ -54,8 +54,8 @@ def fit_pair(
     return Pair(camera, alone, adjust(devices, poses, sightings), sightings)
 
 
-def _relative(in_camera: list[Pose], in_projector: tuple[Pose, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Projector from camera, averaged over the boards that both place."""
+def between(in_camera: list[Pose], in_projector: tuple[Pose, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation vector and translation [m] of the projector from camera, averaged over the boards that both place."""
     rotations, translations = [], []
     for a, b in zip(in_camera, in_projector, strict=True):
         rotation = Rotation.from_rotvec(b.rotation_rad) * Rotation.from_rotvec(a.rotation_rad).inv()

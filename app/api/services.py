@@ -81,7 +81,7 @@ def create_services(config: ServiceConfig) -> Services:
         cameras,
         CaptureDesk(cameras, news.tell, beside=beside, projector=projector),
         beside,
-        CalibrationDesk(cameras, screen, news.tell),
+        CalibrationDesk(cameras, screen, news.tell, projector),
         screen,
         projector,
     )

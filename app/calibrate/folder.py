@@ -7,6 +7,7 @@ calibration/shared.json            boards that several cameras saw at once
 calibration/flat-<camera>.tif      flat field, if measured
 """
 
+import contextlib
 import dataclasses
 import datetime as dt
 import shutil
@@ -22,7 +23,9 @@ from app.files.durable import make_folder, write_text
 from app.files.lock import locked
 from app.files.reading import reading
 from app.rig.conditions import Conditions, known_pairs
-from calibration.bundle import Bundle, to_json
+from calibration.bundle import Bundle, CalibratedOptics, CalibratedWall, to_json
+from calibration.errors import CalibrationError
+from calibration.further_projector import FurtherProjector, build_projector
 from calibration.model import Model
 from calibration.record import Record, record_from_json, record_to_json
 from calibration.shared import SharedRecord, shared_from_json, shared_to_json
@@ -60,6 +63,12 @@ class CalibrationFolder:
         settings = self.settings()
         return settings is None or settings.scene.views[0].name == camera
 
+    def owner(self, camera: str) -> str | None:
+        """The view whose camera takes the pictures of that view; None where it has its own. Raises BadInputError."""
+        settings = self.settings()
+        views = () if settings is None else settings.scene.views
+        return next((view.camera_of for view in views if view.name == camera), None)
+
     def live(self, what: str, camera: str) -> Path:
         """The folder of the pictures that a guided step takes with a camera."""
         return self.folder / (f"live-{what}" if self.is_first(camera) else f"live-{what}-{in_a_name(camera)}")
@@ -75,11 +84,13 @@ class CalibrationFolder:
     def record(self, camera: str) -> Record | None:
         """What was seen, of the camera that the bundle holds as measured. Raises BadInputError."""
         path = self._record_path(camera)
-        if not path.exists() or not any(
-            one.name == camera and one.quality.source == "measured" for one in self.bundle().cameras
-        ):
-            return None
-        return _read_record(path)
+        return _read_record(path) if path.exists() and self._is_measured(camera) else None
+
+    def _is_measured(self, camera: str) -> bool:
+        """Whether the bundle holds what the record is of: the camera, or of another view's camera the projector."""
+        own = self.bundle().of(camera, self.is_first(camera))
+        parts = own.cameras if self.owner(camera) is None else (own.projector,)
+        return any(one is not None and one.quality.source == "measured" for one in parts)
 
     def collected(self, camera: str) -> Record | None:
         """What was seen so far, that of a started step included. Raises BadInputError."""
@@ -122,14 +133,14 @@ class CalibrationFolder:
         for path in unused:
             shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
 
-    def put_to_use(self, model: Model) -> Bundle:
+    def put_to_use(self, model: Model | FurtherProjector) -> Bundle:
         """Make a complete step's models and record those in use."""
         bundle = self._save_model(model)
         write_text(self._record_path(model.record.camera), record_to_json(model.record))
         self.forget_started(model.record.camera)
         return bundle
 
-    def _save_model(self, model: Model) -> Bundle:
+    def _save_model(self, model: Model | FurtherProjector) -> Bundle:
         """Put the model's parts into the bundle, with the date and the pictures' hashes."""
         record = model.record
         seen = [*record.boards, *(s for s in (record.wall, record.level) if s is not None)]
@@ -137,15 +148,25 @@ class CalibrationFolder:
 
         def change(old: Bundle) -> Bundle:
             others = {name: sha for name, sha in old.images.items() if sha not in images.values()}
-            parts = {"projector": model.projector_optics, "wall": model.wall}
-            new = old.with_camera(model.camera_optics).with_view(
-                record.camera,
-                self.is_first(record.camera),
-                **{name: part for name, part in parts.items() if part is not None},
-            )
-            return dataclasses.replace(new, date=now(), images=others | images, joint=None)
+            new = old if isinstance(model, FurtherProjector) else old.with_camera(model.camera_optics)
+            new = new.with_view(record.camera, self.is_first(record.camera), **_parts(model))
+            if not isinstance(model, FurtherProjector):
+                new = dataclasses.replace(self._followed(new, record.camera), joint=None)
+            return dataclasses.replace(new, date=now(), images=others | images)
 
         return self.change_bundle(change)
+
+    def _followed(self, bundle: Bundle, camera: str) -> Bundle:
+        """The bundle with the projectors of other views that this camera sees, placed by where it is now."""
+        settings = self.settings()
+        for view in () if settings is None else settings.scene.views:
+            record = self.record(view.name) if view.camera_of == camera else None
+            if record is None:
+                continue
+            with contextlib.suppress(CalibrationError):  # it fitted before: what it was stays
+                found = build_projector(record, bundle.camera(camera))
+                bundle = bundle.with_view(view.name, self.is_first(view.name), projector=found.optics)
+        return bundle
 
     def shared(self) -> SharedRecord:
         """The boards that several cameras saw at once, so far. Raises BadInputError."""
@@ -177,6 +198,7 @@ class CalibrationFolder:
                 parts = {"projector": view.projector, "wall": view.wall}
                 kept = {part: value for part, value in parts.items() if value is not None}
                 old = old.with_camera(view.camera).with_view(name, self.is_first(name), **kept)
+                old = self._followed(old, name)
             return dataclasses.replace(old, date=now(), joint=found.joint)
 
         return self.change_bundle(change)
@@ -209,6 +231,14 @@ class CalibrationFolder:
 def in_a_name(camera: str) -> str:
     """A camera's name as part of a file's."""
     return quote(camera, safe=" ()+,@")
+
+
+def _parts(model: Model | FurtherProjector) -> dict[str, CalibratedOptics | CalibratedWall]:
+    """What a view has of its own by a model."""
+    if isinstance(model, FurtherProjector):
+        return {"projector": model.optics}
+    parts = {"projector": model.projector_optics, "wall": model.wall}
+    return {name: part for name, part in parts.items() if part is not None}
 
 
 def _read_record(path: Path) -> Record:

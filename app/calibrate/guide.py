@@ -22,6 +22,7 @@ from app.calibrate.steps import (
     modelled,
     put_to_use,
 )
+from app.calibrate.whose import check_own
 from app.errors import AirlensError, BadInputError
 from app.rig.stage import Stage, StageTask, TaskKind
 from calibration.board import Board
@@ -142,10 +143,11 @@ class GuidedCalibration:
         record, step = self.record, self._plan.step
         if record is None or self._calibration.started(self._plan.camera) is not step:
             return True
-        return put_to_use(self._calibration, modelled(step, record, [])).model is not None
+        return put_to_use(self._calibration, modelled(self._calibration, step, record, [])).model is not None
 
     def _check(self) -> None:
         step, plan = self._plan.step, self._plan
+        check_own(self._calibration, plan.camera, step)
         if step in (StepName.camera, StepName.projector) and plan.board is None:
             raise BadInputError(
                 "The board is not known. State it under Board on the page, by --grid and --square, or as "

@@ -16,6 +16,7 @@ from calibration.board import Board, board_of
 from calibration.board_kind import BoardKind
 from calibration.errors import CalibrationError
 from calibration.record import Placement
+from core.scene import ProjectedPattern
 
 Folder = Annotated[Path, typer.Argument(help="The experiment's folder.")]
 Images = Annotated[Path | None, typer.Option(help="Folder of pictures; without it, live on the rig.")]
@@ -109,14 +110,15 @@ def named_view(folder: CalibrationFolder, name: str | None) -> str:
     return view_names(experiment)[view_number(experiment, name)]
 
 
-def panel_size(folder: CalibrationFolder, text: str | None) -> tuple[int, int]:
-    """The projector's pixels from the option, or from the experiment's scene. Raises BadInputError."""
+def panel_size(folder: CalibrationFolder, view: str, text: str | None) -> tuple[int, int]:
+    """The pixels of a view's projector from the option, or from the experiment's scene. Raises BadInputError."""
     if text is not None:
         return size_of(text, "--projector-px", "1024x768")
     settings = folder.settings()
-    if settings is not None and settings.scene.light.kind == "projector":
-        optics = settings.scene.light.projector
-        return optics.width_px, optics.height_px
+    if settings is not None:
+        light = next(one.light or settings.scene.light for one in settings.scene.views if one.name == view)
+        if isinstance(light, ProjectedPattern):
+            return light.projector.width_px, light.projector.height_px
     raise BadInputError(
         "The projector's size is not known; give its native pixels, such as --projector-px 1024x768."
     )

@@ -10,14 +10,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from app.calibrate.folder import CalibrationFolder
+from app.calibrate.steps import own_model
 from app.errors import BadInputError
 from app.files.durable import write_text
 from app.report.figures import as_data_uri
 from calibration.advice import coverage
 from calibration.bundle import Bundle
 from calibration.errors import CalibrationError
+from calibration.further_projector import FurtherProjector
 from calibration.intrinsics import Intrinsics
-from calibration.model import Model, build
+from calibration.model import Model
 from calibration.sensitivity import shift_uncertainty
 from calibration.turned import turned
 from core.geometry import Optics
@@ -36,20 +38,21 @@ def fragment(calibration: CalibrationFolder, camera: str = "camera") -> str:
         f"<figcaption>{html.escape(title)}</figcaption></figure>"
         for title, figure in figures(model, bundle)
     ]
-    advice = [*model.camera_optics.quality.advice]
-    if model.projector_optics is not None:
-        advice += [f"Projector: {a}" for a in model.projector_optics.quality.advice]
+    own = model.optics if isinstance(model, FurtherProjector) else model.projector_optics
+    advice = [] if isinstance(model, FurtherProjector) else [*model.camera_optics.quality.advice]
+    if own is not None:
+        advice += [f"Projector: {a}" for a in own.quality.advice]
     items = "".join(f"<li>{html.escape(a)}</li>" for a in advice) or "<li>Nothing to retake.</li>"
     return f'<section class="calibration"><h2>Calibration</h2>{"".join(parts)}<ul>{items}</ul></section>'
 
 
-def measured_model(calibration: CalibrationFolder, camera: str = "camera") -> Model | None:
+def measured_model(calibration: CalibrationFolder, camera: str = "camera") -> Model | FurtherProjector | None:
     """The models of a measured calibration; none where nothing was measured. Raises BadInputError."""
     record = calibration.record(camera)
     if record is None:
         return None
     try:
-        return build(record)
+        return own_model(calibration, record)
     except CalibrationError as error:
         raise BadInputError(str(error)) from error
 
@@ -65,8 +68,11 @@ def write_page(calibration: CalibrationFolder, camera: str = "camera") -> str:
     return str(path)
 
 
-def figures(model: Model, bundle: Bundle) -> list[tuple[str, Figure]]:
+def figures(model: Model | FurtherProjector, bundle: Bundle) -> list[tuple[str, Figure]]:
     """Titles and figures, each only where its data are known; `bundle` is that of the model's view."""
+    if isinstance(model, FurtherProjector):
+        size_px = model.record.panel_size_px or (1, 1)
+        return [("Projector: residuals (enlarged) and coverage", _residuals(model.projector, size_px))]
     record = model.record
     # A camera of another wall is drawn in its own frame, in which that wall is the back one.
     bundle = turned(bundle, record.placement.wall)

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import tifffile
 
-from app.calibrate.folder import CalibrationFolder, now
+from app.calibrate.folder import CalibrationFolder, StepName, now
+from app.calibrate.whose import check_own
 from app.errors import BadInputError
 from app.files.durable import write_durably
 from app.files.image_folder import find_images, read_grey
@@ -28,8 +29,9 @@ from calibration.response import flat_field, measure_camera, measure_projector
 def calibrate_response(calibration: CalibrationFolder, camera: str, folder: Path, bits: int) -> Bundle:
     """Measure dark level, gain, read noise, linearity, the projector's curve and the flat field.
 
-    Raises BadInputError for a folder that does not hold what is needed.
+    Raises BadInputError for a folder that does not hold what is needed, and for another view's camera.
     """
+    check_own(calibration, camera, StepName.response)
     bursts = _bursts(folder)
     if "dark" not in bursts:
         raise BadInputError(f"{folder} has no subfolder 'dark'; take frames with the lens covered.")

@@ -17,9 +17,11 @@ from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.calibrate.pictures import CalibrationStoppedError
 from app.errors import AirlensError
 from app.experiment.folder import Experiment
-from app.experiment.views import view_number
+from app.experiment.views import opened_for, view_number
 from app.rig.conditions import Conditions, conditions_of
+from app.rig.lamps import lamps_beside
 from app.rig.live_cameras import LiveCameras
+from app.rig.live_projector import LiveProjector
 from app.rig.open import open_camera, open_stage, panel_of
 from app.rig.stage import RealStage, Stage, StageTask, UnopenedStage
 from app.states import StateMachine
@@ -83,12 +85,21 @@ class GuideStatus:
 
 
 class CalibrationDesk:
-    """Uses the cameras of `live` and the operator's page as `screen`; `tell(kind, body)` hears of progress."""
+    """Uses the cameras of `live` and the operator's page as `screen`; `tell(kind, body)` hears of progress.
+
+    Of several projectors before one camera all are dark but the one that is calibrated; `projector` is the one that
+    the service speaks to already.
+    """
 
     def __init__(
-        self, live: LiveCameras, screen: PatternDisplay, tell: Callable[[str, Mapping[str, Any]], object]
+        self,
+        live: LiveCameras,
+        screen: PatternDisplay,
+        tell: Callable[[str, Mapping[str, Any]], object],
+        projector: LiveProjector | None = None,
     ) -> None:
         self._live, self._screen, self._tell = live, screen, tell
+        self._projector = projector
         self._status = GuideStatus()
         self._skipped: dict[tuple[str, StepName, str], tuple[StageTask, ...]] = {}
         self._lock = threading.Lock()
@@ -209,7 +220,8 @@ class CalibrationDesk:
     def _stage(self, experiment: Experiment, plan: LivePlan) -> Iterator[Stage]:
         """The rig, its camera also shown to whoever looks."""
         name, view = experiment.folder.name, view_number(experiment, plan.camera)
-        live = self._live.of(view)
+        eye = opened_for(experiment, view)
+        live = self._live.of(eye)
         if experiment.settings.rig.camera_kind == "simulated":
             stage = open_stage(experiment, plan.board, view=view)
             self._live.open(name, view, lambda: stage.camera, "practice")
@@ -217,8 +229,10 @@ class CalibrationDesk:
                 yield stage
             return
         if live.status.experiment != name or live.status.state.value != "ready":
-            self._live.open(name, view, lambda: open_camera(experiment, "still", view))
+            self._live.open(name, eye, lambda: open_camera(experiment, "still", view))
         panel = panel_of(experiment.settings.scene, view)
+        if panel is not None:
+            lamps_beside(experiment, self._projector).light(view)
         with live.using() as camera:
             yield RealStage(camera, None if panel is None else self._screen, panel)
 

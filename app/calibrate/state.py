@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.calibrate.folder import StepName
-from app.calibrate.steps import model_of
+from app.calibrate.folder import CalibrationFolder, StepName
+from app.calibrate.steps import own_model
 from calibration.advice import CELLS, advise, coverage
 from calibration.errors import CalibrationError
+from calibration.further_projector import FurtherProjector
 from calibration.intrinsics import Intrinsics
 from calibration.model import Model
 from calibration.record import Record, SeenBoard, array_of
@@ -43,13 +44,13 @@ class CalibrationState:
     advice: tuple[str, ...]
 
 
-def state_of(record: Record | None, step: StepName) -> CalibrationState:
+def state_of(calibration: CalibrationFolder, record: Record | None, step: StepName) -> CalibrationState:
     """The state of the camera, or of the projector when that is the step."""
     of_projector = step is StepName.projector
     boards = () if record is None else tuple(b for b in record.boards if b.panel_px or not of_projector)
     size = None if record is None else record.panel_size_px if of_projector else record.camera_size_px
     try:
-        model = None if record is None else model_of(record)
+        model = None if record is None else own_model(calibration, record)
     except CalibrationError:
         model = None
     fit = _fit(model, of_projector)
@@ -71,16 +72,18 @@ def state_of(record: Record | None, step: StepName) -> CalibrationState:
     )
 
 
-def line_of(record: Record | None, step: StepName) -> str:
+def line_of(calibration: CalibrationFolder, record: Record | None, step: StepName) -> str:
     """One line for the terminal after a view."""
-    state = state_of(record, step)
+    state = state_of(calibration, record, step)
     fit = "" if state.rms_px is None else f", rms {state.rms_px:.3f} px"
     return f"{len(state.views)} views, {100 * state.covered:.0f} % of the picture covered{fit}"
 
 
-def _fit(model: Model | None, of_projector: bool) -> Intrinsics | None:
+def _fit(model: Model | FurtherProjector | None, of_projector: bool) -> Intrinsics | None:
     if model is None:
         return None
+    if isinstance(model, FurtherProjector):
+        return model.projector if of_projector else None
     if not of_projector:
         return model.camera
     return None if model.pair is None else model.pair.projector

@@ -12,10 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from app.calibrate.folder import CalibrationFolder, StepName
+from app.calibrate.whose import check_own
 from app.errors import BadInputError
 from app.files.image_folder import Sequence, find_images, read_grey, sequences
 from calibration.board import Board
+from calibration.bundle import CalibratedOptics
 from calibration.errors import CalibrationError, TooFewViewsError
+from calibration.further_projector import FurtherProjector, build_projector
 from calibration.graycode import decode, frame_count
 from calibration.local import on_panel
 from calibration.model import Model, build
@@ -38,7 +41,7 @@ class StepOutcome:
     """
 
     name: StepName
-    model: Model | None
+    model: Model | FurtherProjector | None
     record: Record
     issues: tuple[str, ...]
     missing: str = ""
@@ -58,6 +61,7 @@ def calibrate_camera(
     calibration: CalibrationFolder, camera: str, pictures: Pictures, board: Board, on_event: OnEvent
 ) -> StepOutcome:
     """Find the board in every picture (of a Gray-code sequence: in white) and fit the camera."""
+    check_own(calibration, camera, StepName.camera)
     files = find_images(pictures.folder, pictures.pattern)
     boards, issues = [], []
     for file in _board_files(pictures, files):
@@ -83,7 +87,11 @@ def calibrate_projector(
     panel_px: tuple[int, int],
     on_event: OnEvent,
 ) -> StepOutcome:
-    """Decode every sequence, carry the board's corners to the panel, and fit camera and projector."""
+    """Decode every sequence, carry the board's corners to the panel, and fit camera and projector.
+
+    Of a view that another one's camera takes the projector alone is fitted: that camera stands as it is.
+    """
+    check_own(calibration, camera, StepName.projector)
     files = find_images(pictures.folder, pictures.pattern)
     boards, issues = [], []
     for sequence in sequences(pictures.folder, files):
@@ -109,6 +117,7 @@ def calibrate_wall(
     on_event: OnEvent,
 ) -> StepOutcome:
     """The wall from Gray code on it, or from a board held flat against it; the world's axes and origin."""
+    check_own(calibration, camera, StepName.wall)
     record = calibration.collected(camera)
     if record is None:
         raise BadInputError("There is no calibrated camera yet; run 'airlens calibrate camera' first.")
@@ -181,22 +190,35 @@ def model_of(record: Record) -> Model:
     return build(record)
 
 
+@functools.lru_cache(maxsize=2)
+def _projector_of(record: Record, camera: CalibratedOptics) -> FurtherProjector:
+    return build_projector(record, camera)
+
+
+def own_model(calibration: CalibrationFolder, record: Record) -> Model | FurtherProjector:
+    """All models of a record; of a view that another one's camera takes the projector. Raises CalibrationError."""
+    owner = calibration.owner(record.camera)
+    return model_of(record) if owner is None else _projector_of(record, calibration.bundle().camera(owner))
+
+
 def built(calibration: CalibrationFolder, step: StepName, record: Record, issues: list[str]) -> StepOutcome:
     """Keep the record as that of a started step, and make its models as far as it allows."""
     calibration.save_started(step, record)
-    return modelled(step, record, issues)
+    return modelled(calibration, step, record, issues)
 
 
-def modelled(step: StepName, record: Record, issues: list[str]) -> StepOutcome:
+def modelled(
+    calibration: CalibrationFolder, step: StepName, record: Record, issues: list[str]
+) -> StepOutcome:
     """A step's models as far as its record allows; too few views yet are no issue."""
     try:
-        model = model_of(record)
+        model = own_model(calibration, record)
     except TooFewViewsError as error:
         return StepOutcome(step, None, record, tuple(issues), str(error))
     except CalibrationError as error:
         return StepOutcome(step, None, record, (*issues, str(error)))
     missing = ""
-    if record.panel_size_px is not None and model.pair is None:
+    if isinstance(model, Model) and record.panel_size_px is not None and model.pair is None:
         lit = sum(bool(b.panel_px) for b in record.boards)
         missing = f"{lit} boards carry usable Gray code; expected at least 3. Take more sequences."
     return StepOutcome(step, model, record, tuple(issues), missing)

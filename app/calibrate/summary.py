@@ -7,6 +7,7 @@ import numpy as np
 
 from app.calibrate.steps import StepOutcome
 from calibration.bundle import CalibratedOptics
+from calibration.further_projector import FurtherProjector
 from calibration.intrinsics import Intrinsics
 from calibration.model import Model
 
@@ -22,6 +23,16 @@ def summary(step: StepOutcome, seconds: float) -> dict[str, Any]:
     if step.model is None:
         return found
     model = step.model
+    if isinstance(model, FurtherProjector):
+        lit = [b.name for b in model.record.boards if b.panel_px]
+        return found | {
+            "projector": _device(model.projector, model.optics, lit),
+            "camera": None,
+            "stereo": {
+                "rms_px": model.rms_px,
+                "baseline_m": float(np.linalg.norm(model.adjusted.devices[1].translation_m)),
+            },
+        }
     names = [b.name for b in model.record.boards]
     found["camera"] = _device(model.camera, model.camera_optics, names)
     if model.pair is not None and model.projector_optics is not None:
@@ -46,7 +57,7 @@ def lines(content: dict[str, Any]) -> list[str]:
     """The summary as sentences for a person."""
     text = []
     for name in ("camera", "projector"):
-        if name in content:
+        if content.get(name):
             d = content[name]
             text.append(
                 f"{name}: rms {d['rms_px']:.3f} px over {len(d['views'])} views, "
@@ -66,7 +77,7 @@ def lines(content: dict[str, Any]) -> list[str]:
         )
     advice = [
         *content["issues"],
-        *(a for n in ("camera", "projector") for a in content.get(n, {}).get("advice", [])),
+        *(a for n in ("camera", "projector") for a in (content.get(n) or {}).get("advice", [])),
     ]
     return text + [f"- {a}" for a in advice]
 

@@ -40,24 +40,37 @@ class LiveOptions:
 def run_live(folder: Path, plan: LivePlan, options: LiveOptions) -> None:
     """Guide through one step on the experiment's rig. Ctrl-C keeps what there is; the same command goes on."""
     from app.capture.burst import interruptible
+    from app.rig.lamps import Lamps
     from app.rig.open import open_stage
 
     experiment = open_experiment(folder)
     calibration = CalibrationFolder(folder)
     view = view_number(experiment, plan.camera)
     with _screen(experiment, options, view) as display, interruptible() as stopped:
+        if display is not None:
+            Lamps(experiment).light(view)
         stage = open_stage(experiment, plan.board, display, view)
         with stage.camera:
             guided = GuidedCalibration(calibration, plan, stage)
             guided.resume()
             for name in options.retake:
                 guided.retake(name)
-            _session(guided, plan.step, Prompt(stage.arranges_itself, options.every_s, stopped), stopped)
+            _session(
+                calibration,
+                guided,
+                plan.step,
+                Prompt(stage.arranges_itself, options.every_s, stopped),
+                stopped,
+            )
             guided.finish()
 
 
 def _session(
-    guided: GuidedCalibration, step: StepName, prompt: "Prompt", stopped: Callable[[], bool]
+    calibration: CalibrationFolder,
+    guided: GuidedCalibration,
+    step: StepName,
+    prompt: "Prompt",
+    stopped: Callable[[], bool],
 ) -> None:
     tries: dict[StageTask, int] = {}
     while (task := guided.wanted()) is not None and not stopped():
@@ -71,7 +84,7 @@ def _session(
         for issue in issues:
             typer.echo(f"- {issue}", err=True)
         if step in (StepName.camera, StepName.projector):
-            typer.echo(line_of(guided.record, step), err=True)
+            typer.echo(line_of(calibration, guided.record, step), err=True)
         tries[task] = tries.get(task, 0) + 1
         if tries[task] >= TRIES and not prompt.attended and guided.wanted() == task:
             typer.echo(f"Left out after {TRIES} tries: {task.text}", err=True)

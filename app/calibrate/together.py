@@ -16,6 +16,7 @@ from app.calibrate.folder import CalibrationFolder, in_a_name
 from app.calibrate.steps import model_of
 from app.errors import BadInputError
 from app.experiment.folder import open_experiment
+from app.experiment.views import own_cameras, view_names
 from app.files.image_folder import find_images, read_grey
 from calibration.board import Board
 from calibration.bundle import CalibratedOptics, Joint
@@ -84,6 +85,8 @@ def seats_of(calibration: CalibrationFolder) -> tuple[tuple[Seat, ...], tuple[st
         )
     seats, without = [], []
     for view in scene.views:
+        if view.camera_of is not None:
+            continue  # its projector goes where that camera goes
         record, light = calibration.record(view.name), view.light or scene.light
         if record is None:
             without.append(view.name)
@@ -114,7 +117,8 @@ def add_pictures(
 
     Returns what is wrong with the pictures. Raises BadInputError where no two cameras have a picture in common.
     """
-    names = [view.name for view in open_experiment(calibration.experiment).settings.scene.views]
+    experiment = open_experiment(calibration.experiment)
+    names = [view_names(experiment)[number] for number in own_cameras(experiment)]
     folders = {name: folder / in_a_name(name) for name in names if (folder / in_a_name(name)).is_dir()}
     if len(folders) < 2:
         raise BadInputError(

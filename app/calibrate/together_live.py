@@ -11,7 +11,7 @@ from app.calibrate.pictures import Shooter
 from app.calibrate.together import add_pictures
 from app.errors import BadInputError
 from app.experiment.folder import Experiment, open_experiment
-from app.experiment.views import view_names
+from app.experiment.views import own_cameras, view_names
 from app.rig.open import open_stage
 from app.rig.stage import HeldBoard, Stage, StageTask, board_size_m
 from calibration.board import Board
@@ -43,7 +43,7 @@ class TogetherSession:
         self._held: list[HeldBoard] = []
         self._skipped = 0
         if self.arranges_itself:
-            cameras = tuple(view.camera for view in scene.views)
+            cameras = tuple(view.camera for view in scene.views if view.camera_of is None)
             # More than are wanted: one in which the board is not found is passed over.
             places = common_places(cameras, scene.room, board_size_m(plan.board), 2 * plan.places)
             self._held = [HeldBoard(centre_m, rotation_vector(axes)) for centre_m, axes in places]
@@ -136,11 +136,11 @@ class TogetherSession:
 
 @contextmanager
 def opened(experiment: Experiment, board: Board) -> Iterator[dict[str, Stage]]:
-    """The stages of all views, by their names, with open cameras. Raises BadInputError, DeviceError."""
+    """The stages of all views that have a camera, by name, with open cameras. Raises BadInputError, DeviceError."""
     with ExitStack() as stack:
         stages = {}
-        for number, name in enumerate(view_names(experiment)):
+        for number in own_cameras(experiment):
             stage = open_stage(experiment, board, None, number)
             stack.enter_context(stage.camera)
-            stages[name] = stage
+            stages[view_names(experiment)[number]] = stage
         yield stages

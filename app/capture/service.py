@@ -9,7 +9,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -25,14 +25,13 @@ from app.experiment.recorder import release, reserve
 from app.experiment.views import opened_for
 from app.live.beside import LiveAir
 from app.rig.conditions import Conditions
-from app.rig.lamps import Lamps
+from app.rig.lamps import lamps_beside
 from app.rig.live_cameras import LiveCameras
 from app.rig.live_projector import LiveProjector
-from app.rig.open import AirState, air_of, open_camera, open_projector
+from app.rig.open import AirState, air_of, open_camera
 from app.states import StateMachine
 from drivers.burst import BurstOutcome, CapturePlan, Progress
 from drivers.errors import DeviceBusyError, DeviceError
-from drivers.projector.protocol import Projector
 from drivers.protocols import Camera
 
 TOLD_EVERY_S = 1.0
@@ -160,7 +159,16 @@ class CaptureDesk:
 
             def takes(camera: Camera, watch: BurstWatch, opens: OpensView) -> tuple[CaptureEvent, str]:
                 return _ending(
-                    order, take_order(camera, experiment, order, watch, name, opens, self._lamps(experiment))
+                    order,
+                    take_order(
+                        camera,
+                        experiment,
+                        order,
+                        watch,
+                        name,
+                        opens,
+                        lamps_beside(experiment, self._projector),
+                    ),
                 )
 
             return self._begin(state, _Run(experiment, plan, name, takes, live=order.live), order.bursts)
@@ -178,21 +186,11 @@ class CaptureDesk:
                 reserve(experiment.captures_folder / name, plan)
 
             def takes(camera: Camera, watch: BurstWatch, opens: OpensView) -> tuple[CaptureEvent, str]:
-                lamps = self._lamps(experiment)
+                lamps = lamps_beside(experiment, self._projector)
                 taken = retake(camera, experiment, parts, number, told, watch, name, lamps)
                 return _ending(Order(plan), [taken])
 
             return self._begin(state, _Run(experiment, plan, name, takes, number, place_of(parts.origin)), 1)
-
-    def _lamps(self, experiment: Experiment) -> Lamps:
-        """The projectors; the first one's line may be held by the service itself."""
-        held, source = self._projector, experiment.folder.name
-
-        def opens(view: int) -> AbstractContextManager[Projector]:
-            found = None if held is None or view != 0 else held.held(source)
-            return closing(open_projector(experiment, view)) if found is None else nullcontext(found)
-
-        return Lamps(experiment, opens)
 
     def _begin(self, state: DeskState, run: _Run, bursts: int) -> DeskStatus:
         """Let a run go on by itself; the desk is locked meanwhile."""
@@ -254,7 +252,7 @@ class CaptureDesk:
     def _take(self, run: _Run) -> tuple[CaptureEvent, str]:
         watch = BurstWatch(
             self._following(run, self._progress),
-            lambda taken, view: self._live.of(run.view or view).show(taken.frame),
+            lambda taken, view: self._live.of(opened_for(run.experiment, run.view or view)).show(taken.frame),
             lambda: run.stop,
             self._following(run, self._begun),
             lambda folder: self._look(run, folder),

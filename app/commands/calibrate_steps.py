@@ -146,7 +146,7 @@ def projector(
         live(folder, plan, LiveOptions(every_s, screen, port, tuple(retake or ())), known, as_json)
         return
     pictures = Pictures(images, pattern, full_scale(bits), white_first)
-    panel = panel_size(folder, projector_px)
+    panel = panel_size(folder, camera, projector_px)
     run(
         lambda say: put_to_use(folder, calibrate_projector(folder, camera, pictures, target, panel, say)),
         folder,
@@ -330,7 +330,7 @@ def live(
         record = folder.collected(plan.camera)
         if record is None:
             raise AirlensError("No view shows the board yet. Run the command again; it goes on from here.")
-        return modelled(plan.step, record, [])
+        return modelled(folder, plan.step, record, [])
 
     run(step, folder, known, as_json)
 

@@ -36,6 +36,11 @@ def opened_for(experiment: Experiment, view: int) -> int:
     return view if simulated else camera_number(experiment, view)
 
 
+def own_cameras(experiment: Experiment) -> tuple[int, ...]:
+    """The numbers of the views that have a camera of their own."""
+    return tuple(n for n, view in enumerate(experiment.settings.scene.views) if view.camera_of is None)
+
+
 def take_turns(experiment: Experiment) -> bool:
     """Whether one camera takes the pictures of several views, under one projector after the other."""
     return any(view.camera_of is not None for view in experiment.settings.scene.views)

@@ -66,14 +66,12 @@ def _with_bundle(scene: Scene, bundle: Bundle) -> tuple[Scene, str]:
 
 def _calibrated_view(scene: Scene, number: int, bundle: Bundle) -> View:
     """A view by what was calibrated with its own camera. A further one that shares the scene's projector then has a
-    light of its own: that projector as its camera placed it. What was not calibrated of a view that another one's
+    light of its own: that projector as its camera placed it. All but the projector of a view that another one's
     camera takes is that one's.
     """
     view = scene.views[number]
-    own, response = bundle.of(view.name, number == 0), bundle.response(view.name)
-    camera = view.name if own.cameras or view.camera_of is None else view.camera_of
-    if response is None and view.camera_of is not None:
-        response = bundle.response(view.camera_of)
+    camera = view.name if view.camera_of is None else view.camera_of
+    own, response = bundle.of(view.name, number == 0), bundle.response(camera)
     light = view.light
     if number > 0 and own.projector is not None:
         light = scene.light if light is None else light

@@ -4,11 +4,12 @@ Each shows its own pattern all the time; dark is its own "mute", which blanks th
 """
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, closing
+from contextlib import AbstractContextManager, closing, nullcontext
 
 from app.errors import AirlensError
 from app.experiment.folder import Experiment
 from app.experiment.views import camera_number, view_names
+from app.rig.live_projector import LiveProjector
 from app.rig.open import open_projector
 from drivers.projector.protocol import Projector
 
@@ -51,3 +52,13 @@ class Lamps:
                 "camera sees several projectors in turn, so each must be on and know mute. Check it: airlens "
                 "projector status ADDRESS."
             )
+
+
+def lamps_beside(experiment: Experiment, held: LiveProjector | None) -> Lamps:
+    """The projectors, where the first one's line may be held by a service itself."""
+
+    def opens(view: int) -> AbstractContextManager[Projector]:
+        found = None if held is None or view != 0 else held.held(experiment.folder.name)
+        return closing(open_projector(experiment, view)) if found is None else nullcontext(found)
+
+    return Lamps(experiment, opens)

@@ -29,10 +29,17 @@ class NextResource(WireModel):
 
 
 class SeenWallLine(WireModel):
-    """A view: what its camera is called, and the wall that it looks at."""
+    """A view: what it is called, the wall that it looks at, and whose camera takes its pictures.
+
+    `camera` is the number of the view whose camera is opened for it, mostly its own; `camera_of` names that view
+    where it is another one. `light` is what patterns the wall.
+    """
 
     name: str
     wall: str
+    camera: int
+    camera_of: str | None = None
+    light: Literal["texture", "projector"]
 
 
 class ExperimentLine(WireModel):

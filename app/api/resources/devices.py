@@ -14,6 +14,7 @@ from app.api.services import Given, services_of
 from app.api.wire.bodies import body
 from app.api.wire.problems import ApiError
 from app.api.wire.viewer import Viewer
+from app.experiment.views import opened_for
 from app.rig.frame_statistics import LiveFrame
 from app.rig.live_camera import CameraState
 from app.rig.open import open_camera
@@ -42,11 +43,12 @@ async def read_camera(given: Given, view: ViewNumber = 0) -> CameraResource:
 
 @router.post("/devices/camera/connect")
 def connect_camera(given: Given, wanted: OpenCamera) -> CameraResource:
-    """Connect, or reconnect, the camera of a view of an experiment's rig."""
+    """Connect, or reconnect, the camera of a view of a rig; the answer's `view` is the one whose camera it is."""
     experiment, view = given.confirmed.check(given.folders.open(wanted.experiment)), wanted.view
     views = len(experiment.settings.scene.views)
     if view >= views:
         raise ApiError("not_found", f"The experiment has {views} views; there is no view {view}.")
+    view = opened_for(experiment, view)
     status = given.cameras.open(
         wanted.experiment, view, lambda: open_camera(experiment, wanted.air, view), wanted.air
     )

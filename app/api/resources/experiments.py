@@ -4,7 +4,7 @@ import contextlib
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from fastapi import APIRouter, Response
 
@@ -27,11 +27,12 @@ from app.calibrate.parts import is_calibrated, parts_of
 from app.errors import BadInputError
 from app.experiment.folder import SETTINGS_FILE, Experiment, finished, save_settings
 from app.experiment.plan import PLAN_FILE
+from app.experiment.views import opened_for
 from app.files.reading import reading
 from app.files.toml import to_plain
 from app.simulate.rehearsal import Rehearsal, rehearse
 from app.whereabouts import next_step
-from core.scene import Marks, ProjectedPattern, Scene
+from core.scene import Light, Marks, ProjectedPattern, Scene
 
 router = APIRouter(tags=["experiments"])
 
@@ -139,7 +140,7 @@ def _line(experiment: Experiment) -> ExperimentLine:
         information=settings.information,
         camera=settings.rig.camera_kind,
         projector=settings.rig.projector is not None,
-        light="projector" if isinstance(settings.scene.light, ProjectedPattern) else "texture",
+        light=_kind(settings.scene.light),
         calibrated=is_calibrated(parts),
         uncalibrated=[part.step.value for part in parts if part.needed and part.state == "missing"],
         planned=(experiment.folder / PLAN_FILE).is_file(),
@@ -148,8 +149,21 @@ def _line(experiment: Experiment) -> ExperimentLine:
         changed=_changed(experiment.folder),
         revision=experiment.revision,
         next=_next(experiment),
-        views=[SeenWallLine(name=view.name, wall=view.wall) for view in settings.scene.views],
+        views=[
+            SeenWallLine(
+                name=view.name,
+                wall=view.wall,
+                camera=opened_for(experiment, number),
+                camera_of=view.camera_of,
+                light=_kind(view.light or settings.scene.light),
+            )
+            for number, view in enumerate(settings.scene.views)
+        ],
     )
+
+
+def _kind(light: Light) -> Literal["texture", "projector"]:
+    return "projector" if isinstance(light, ProjectedPattern) else "texture"
 
 
 def _next(experiment: Experiment) -> NextResource | None:

@@ -127,7 +127,7 @@ def _resource(given: Services, experiment: Experiment, plan: LivePlan) -> GuideR
     except BadInputError as error:
         wanted, reason = None, str(error)
     folder = CalibrationFolder(experiment.folder)
-    state = state_of(folder.collected(plan.camera), plan.step)
+    state = state_of(folder, folder.collected(plan.camera), plan.step)
     return GuideResource(
         state=status.state.value if own else "idle",
         busy=status.state is GuideState.running,

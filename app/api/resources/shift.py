@@ -9,10 +9,11 @@ from jaxtyping import Float32
 
 from app.api.models.shift import ShiftResource
 from app.api.resources.devices import ViewNumber
-from app.api.services import Given
+from app.api.services import Given, Services
 from app.api.wire.problems import ApiError
 from app.experiment.captures import load_capture
 from app.experiment.folder import Experiment, read_manifest
+from app.experiment.views import opened_for
 from app.rig.live_camera import CameraState, LiveCamera
 from drivers.protocols import Frame
 from drivers.quick_look import quick_look
@@ -23,7 +24,7 @@ router = APIRouter(tags=["devices"])
 @router.get("/devices/camera/shift")
 def read_shift(given: Given, view: ViewNumber = 0) -> ShiftResource:
     """Compare one frame of a view's connected camera with the newest reference of its experiment."""
-    camera = given.cameras.there(view)
+    camera = given.cameras.there(_opened(given, view))
     frame, experiment = _frame(camera), given.folders.open(camera.status.experiment or "")
     folder = experiment.latest_capture("reference")
     reference = _image(folder, view)
@@ -39,6 +40,15 @@ def read_shift(given: Given, view: ViewNumber = 0) -> ShiftResource:
         largest_px=found.largest_px,
         tiles=len(found.inner_px),
     )
+
+
+def _opened(given: Services, view: int) -> int:
+    """Whose camera is open for a view of the experiment whose cameras are."""
+    source = given.camera.status.experiment
+    if source is None:
+        return view
+    experiment = given.folders.open(source)
+    return opened_for(experiment, view) if view < len(experiment.settings.scene.views) else view
 
 
 def _frame(live: LiveCamera) -> Frame:

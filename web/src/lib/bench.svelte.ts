@@ -247,7 +247,7 @@ class Bench {
   /** Connects the cameras of all views, in turn; what is wrong with a further one is told at its picture. */
   async connect(): Promise<void> {
     await this.connectView(0);
-    for (let view = 1; view < (this.current?.views.length ?? 1); view++) {
+    for (const view of new Set(this.current?.views.map((one) => one.camera).filter((one) => one > 0) ?? [])) {
       try {
         await this.connectView(view);
       } catch (error) {

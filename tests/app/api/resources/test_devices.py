@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -10,6 +11,8 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from app.client import Client, ServiceError
+from app.experiment.folder import save_settings
+from app.experiment.rig_settings import V4l2CameraSettings
 from drivers.simulated import SimulatedCamera
 from tests.app.api.conftest import Live
 from tests.app.rig.test_live_camera import SCENE
@@ -103,3 +106,34 @@ def test_mjpeg_is_there_for_a_browser_without_websocket(camera: Live):
         assert answer.headers["content-type"].startswith("multipart/x-mixed-replace")
         first = next(answer.iter_bytes())
     assert first.startswith(b"--frame\r\nContent-Type: image/jpeg")
+
+
+def test_a_view_that_another_ones_camera_takes_shows_that_camera(live: Live, monkeypatch: pytest.MonkeyPatch):
+    opened: list[int] = []
+
+    def camera_of(experiment, air, view=0, moment=None):
+        opened.append(view)
+        return SimulatedCamera(lambda: SCENE, seed=1)
+
+    monkeypatch.setattr("app.api.resources.devices.open_camera", camera_of)
+    with Client(live.url, live.token) as client:
+        made = client.create_experiment("Two lights", camera_px=128, light="projector").experiment
+        found = live.app.state.services.folders.open(made)
+        scene = found.settings.scene
+        second = replace(scene.views[0], name="second", light=scene.light, camera_of=scene.views[0].name)
+        kernel = V4l2CameraSettings(kind="v4l2", width_px=128, height_px=96)
+        rig = found.settings.rig.model_copy(update={"camera": kernel})
+        changed = {"rig": rig, "scene": replace(scene, views=(scene.views[0], second))}
+        save_settings(found.folder, found.settings.model_copy(update=changed))
+    with live.client() as asking:
+        asking.put(f"/api/experiments/{made}/addresses", json={"addresses": ["/dev/video0"]})
+        views = asking.get(f"/api/experiments/{made}").json()["views"]
+        assert [(one["camera"], one["camera_of"], one["light"]) for one in views] == [
+            (0, None, "projector"),
+            (0, views[0]["name"], "projector"),
+        ]
+        answer = asking.post("/api/devices/camera/connect", json={"experiment": made, "view": 1}).json()
+        assert (answer["view"], answer["state"]) == (0, "ready")
+        assert opened == [0]
+        assert len(live.app.state.services.cameras.known) == 1
+        asking.post("/api/devices/camera/disconnect")
