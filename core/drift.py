@@ -84,14 +84,6 @@ def nearly_still(measurement: ShiftMeasurement) -> ShiftMeasurement:
     return replace(measurement, displacement_px=left)
 
 
-def motion_hides(measurement: ShiftMeasurement) -> bool:
-    """Whether the camera may have moved the picture by more than the air did."""
-    if measurement.motion is None:
-        return False
-    shifts_px = np.linalg.norm(nearly_still(measurement).displacement_px, axis=1)
-    return float(np.linalg.norm(measurement.motion.root_px, axis=0).max()) > float(np.median(shifts_px))
-
-
 def move_image(image: Image, motion: Similarity) -> Image:
     """`image` as it looks after `motion`, by a quintic spline (edges are repeated).
 

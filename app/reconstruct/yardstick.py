@@ -90,8 +90,7 @@ class Rigid:
 def read_motion(exposures: Exposures, windows: Mask) -> Rigid:
     """The motion of the camera as these windows tell it, if they are still."""
     shape, first = exposures.before.shape, exposures.as_they_are.measured(follow=False)
-    seen = np.trace(first.information_per_px2, axis1=1, axis2=2) > _SEEN_PER_PX2
-    if (good_windows(first, windows) & seen).sum() < _LEAST_IN_PART:
+    if good_windows(first, windows).sum() < _LEAST_IN_PART:
         return Rigid(first, Similarity(), np.full((4, 4), np.inf), 0.0, 0)
     shift, drift = aligned(exposures, windows)
     good = good_windows(shift, windows)
@@ -142,8 +141,9 @@ def aligned(exposures: Exposures, yardstick: Mask) -> tuple[ShiftMeasurement, Si
 
 
 def good_windows(shift: ShiftMeasurement, chosen: Mask) -> Mask:
-    """The chosen windows that show the pattern, moved."""
-    return chosen if shift.refused is None else chosen & ~shift.refused
+    """The chosen windows that show something, and show it moved: a bare wall tells nothing, nor that it is still."""
+    shows = np.trace(shift.information_per_px2, axis1=1, axis2=2) > _SEEN_PER_PX2
+    return chosen & shows if shift.refused is None else chosen & shows & ~shift.refused
 
 
 def is_noise(mean_square: float, windows: int) -> bool:
@@ -158,8 +158,14 @@ def _together(parts: Sequence[Yardstick]) -> Mask:
 def _why_not(shift: ShiftMeasurement, part: Yardstick, shape: tuple[int, int]) -> str | None:
     """Why a part alone is no yardstick; None where nothing speaks against it."""
     good = good_windows(shift, part.windows)
+    if part.windows.sum() < _LEAST_IN_PART:
+        return (
+            f"{int(part.windows.sum())} windows lie in it; expected {_LEAST_IN_PART} at least. Draw it larger"
+        )
     if good.sum() < _LEAST_IN_PART:
-        return f"{int(good.sum())} windows lie in it; expected {_LEAST_IN_PART} at least. Draw it larger"
+        return (
+            f"{int(good.sum())} of its {int(part.windows.sum())} windows show something that can be followed"
+        )
     rest, _ = fit_similarity(shift, good, shape)
     unlike = _mean_square(shift, shift.displacement_px - rest.displacement_px(shift.centres_px, shape), good)
     if not is_noise(unlike, int(good.sum())):

@@ -6,7 +6,8 @@ The correction is constant along y, the direction of view, since one view sees o
 K has three parts: errors of the profile over height, local errors in the x-z section, and an error of the
 level (the mean). Images do not see the level; thermometers do (a plane, outlets, sensors). A plane on a wall
 of unknown temperature lies in that wall's thermal layer, which the model may have wrong by one constant: that
-constant is estimated too. Walls of stated temperature keep it. The velocity is not corrected.
+constant is estimated too. Walls of stated temperature keep it. So are the errors that the windows of a picture share,
+such as what the camera may have done. The velocity is not corrected.
 
 How large the correction may be follows from the residual itself, by its marginal likelihood: a room that the data
 contradict is corrected further, and is less certain, than one that they confirm. The error of images and planes
@@ -58,7 +59,7 @@ class Correction(eqx.Module):
 
 
 class _Residuals(eqx.Module):
-    """Residuals of one kind and their derivatives in the coefficients and the planes' layers.
+    """Residuals of one kind and their derivatives in the coefficients, the planes' layers and the shared errors.
 
     `start` is the kind's error beyond noise from which the search begins; None: thermometers, which read one point
     where the correction is a mean along y.
@@ -103,9 +104,10 @@ def temperature_correction(
     kinds = _kinds(data, excess_k, residual, basis, unknown_walls, outlet_std_k)
     layers = sum(plane.wall in unknown_walls for plane in data.planes)
     layer_k2 = np.eye(layers) * (_LAYER_SHARE * departure_k) ** 2
+    shared = np.eye(_shared_errors(data).shape[1])
 
     def prior_k2(std_k: float) -> np.ndarray:
-        return np.asarray(block_diag(_prior_k2(std_k) + level_std_k**2, layer_k2))
+        return np.asarray(block_diag(_prior_k2(std_k) + level_std_k**2, layer_k2, shared))
 
     std_k, errors = _sizes(kinds, prior_k2, wrong_share * departure_k * float(np.sqrt(_SEEN_SHARE)))
     prior = prior_k2(std_k)
@@ -128,7 +130,8 @@ def _kinds(
 ) -> list[_Residuals]:
     """What there is of images, planes, sensors and outlets."""
     _, variance, group = data.values()
-    layers = sum(plane.wall in unknown_walls for plane in data.planes)
+    layers, shared = _layer_design(data, unknown_walls), _shared_errors(data)
+    own_errors = data.unshared(residual, variance)
     found = []
     for g, design in (
         (IMAGES, _shift_design(data, excess_k, basis)),
@@ -138,12 +141,15 @@ def _kinds(
     ):
         own = group == g
         if own.any():
-            extra = _layer_design(data, unknown_walls) if g == PLANES else np.zeros((len(design), layers))
+            others = (
+                columns if g == of else np.zeros((len(design), columns.shape[1]))
+                for of, columns in ((PLANES, layers), (IMAGES, shared))
+            )
             # A hundredth of the noise at least: the search begins above zero where a room fits exactly.
             least = 0.01 * float(np.sqrt(np.median(variance[own])))
-            start = max(0.5 * spread(residual[own]), least) if g in (IMAGES, PLANES) else None
+            start = max(0.5 * spread(own_errors[own]), least) if g in (IMAGES, PLANES) else None
             noise = variance[own] + (outlet_std_k**2 if g == OUTLETS else 0.0)
-            found.append(_Residuals(residual[own], noise, np.concatenate([design, extra], axis=1), start))
+            found.append(_Residuals(residual[own], noise, np.concatenate([design, *others], axis=1), start))
     return found
 
 
@@ -192,7 +198,9 @@ def _fit(
         known = known + (kind.design.T * weight) @ kind.design
         gained = gained + (kind.design.T * weight) @ kind.residual
         unlikely += count * float(np.log(variance).sum()) + float(weight @ kind.residual**2)
-    covariance = np.linalg.inv(known)
+    # Scaled: pictures tell a motion of a pixel to a millionth of it.
+    scale = 1.0 / np.sqrt(np.diagonal(known))
+    covariance = np.linalg.inv(known * np.outer(scale, scale)) * np.outer(scale, scale)
     mean = covariance @ gained
     unlikely += float(np.linalg.slogdet(known)[1] + np.linalg.slogdet(prior)[1]) - float(gained @ mean)
     return _Fitted(mean, covariance, -0.5 * unlikely)
@@ -208,6 +216,12 @@ def _layer_design(data: Observations, unknown_walls: Collection[str]) -> Float[n
     blocks = data.plane_blocks()
     columns = np.repeat(np.eye(len(blocks)), blocks, axis=0)
     return columns[:, [plane.wall in unknown_walls for plane in data.planes]]
+
+
+def _shared_errors(data: Observations) -> Float[np.ndarray, "shifts errors"]:
+    """What the blocks' shifts share, one column for each independent error of one standard deviation."""
+    columns = [block.shared_px.reshape(block.displacement_px.size, -1) for block in data.shifts]
+    return np.asarray(block_diag(*columns)) if columns else np.zeros((0, 0))
 
 
 def _prior_k2(std_k: float) -> Float[np.ndarray, "lattice lattice"]:

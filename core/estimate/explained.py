@@ -5,7 +5,7 @@ import numpy as np
 from scipy.stats import norm
 
 from core.estimate.image_noise import images
-from core.estimate.observation import IMAGES, Observations
+from core.estimate.observation import Observations
 from core.room.vertices import RoomFields
 
 # Share left that is assumed where the images do not tell it: there are none, or all that they show may be noise.
@@ -77,8 +77,6 @@ def explained(data: Observations, fields: RoomFields) -> Explained:
 
 def likeness(data: Observations, fields: RoomFields) -> float:
     """Correlation of the measured shifts with what these fields show, -1 to 1; 0 where there are no images."""
-    values, _, group = data.values()
-    shifts = group == IMAGES
-    predicted = data.predicted(fields)[shifts]
-    size = float(np.linalg.norm(values[shifts]) * np.linalg.norm(predicted))
-    return float(values[shifts] @ predicted) / max(size, float(np.finfo(np.float32).tiny))
+    seen = images(data, fields)
+    size = float(np.linalg.norm(seen.values_px) * np.linalg.norm(seen.predicted_px))
+    return float(seen.values_px @ seen.predicted_px) / max(size, float(np.finfo(np.float32).tiny))

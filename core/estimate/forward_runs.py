@@ -49,7 +49,6 @@ class RoomSettings:
     `jacobian_valid`: a Jacobian is computed anew once a parameter has moved this far from where it was computed.
     `jacobian_valid_walls`, `renewals`: the same for the fine room where walls are unknown, and how often at most.
     `fine_step`: rounds on the fine grid end when no parameter moves by more. A march of `final_s` follows.
-    `growing_rounds`, `ensemble_rounds`: rounds of an ensemble's fit in which the data's weight grows, and all.
     `wall_heat`: multiplies the walls' heat coefficient from the heat balance, or the nominal one.
     `log_viscosity_std`: prior deviation of the eddy viscosity's logarithm over the room; None takes the
     closure's (`core.estimate.prior`).
@@ -66,8 +65,6 @@ class RoomSettings:
     jacobian_valid_walls: float = 1.5
     renewals: int = 2
     fine_step: float = 0.3
-    growing_rounds: int = 6
-    ensemble_rounds: int = 12
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 60.0

@@ -72,16 +72,12 @@ def with_noise_seen(data: Observations, fields: RoomFields) -> Observations:
 
 
 def unshared(data: Observations, shifts_px: Float[np.ndarray, " shifts"]) -> Float[np.ndarray, " shifts"]:
-    """Shifts of all views without the errors that windows share, fitted to them at any size.
-
-    `ShiftBlocks.still` leaves a rest of these errors in the blocks, which is larger than the noise: it weighs them
-    against what a grid cannot represent.
-    """
+    """Shifts of all views without the errors that windows share, fitted to them at any size."""
     rest = shifts_px.copy()
     for blocks, own in _views(data):
-        if blocks.still is not None:
+        if blocks.shared_px.shape[2]:
             std = np.sqrt(blocks.variance_px2).ravel()
-            shared, *_ = svd(blocks.still.out.reshape(len(std), -1) / std[:, None], full_matrices=False)
+            shared, *_ = svd(blocks.shared_px.reshape(len(std), -1) / std[:, None], full_matrices=False)
             rest[own] -= std * (shared @ (shared.T @ (shifts_px[own] / std)))
     return rest
 

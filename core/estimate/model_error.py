@@ -86,9 +86,13 @@ def model_error(
     jacobian = derivatives.per_deviation(data.predicted).T
     between = [data.predicted(other) - data.predicted(one) for one, other in pairs]
     if len(posterior.deviation):
-        weighted = jacobian.T / posterior.deviation**2
-        normal = weighted @ jacobian + np.eye(len(posterior.vector))
-        moved = np.stack([np.linalg.solve(normal, weighted @ apart) for apart in between])
+        variance = posterior.deviation**2
+        slopes = data.unshared(jacobian, variance)
+        weighted = slopes.T / variance
+        normal = weighted @ slopes + np.eye(len(posterior.vector))
+        moved = np.stack(
+            [np.linalg.solve(normal, weighted @ data.unshared(apart, variance)) for apart in between]
+        )
     else:
         moved = np.zeros((len(pairs), len(posterior.vector)))
     seen = images(data, found)

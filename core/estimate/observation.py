@@ -5,18 +5,19 @@ are left out: the thermal layer there is thinner than a cell. A plane of known T
 its noise; the fit adds the representation error.
 """
 
+import math
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 from scipy.interpolate import RegularGridInterpolator
 
-from core.data_error import CORRELATED_DATA, PLANE_NOISE_K, REPRESENTATION, WALL_MARGIN
-from core.drift import nearly_still
+from core.data_error import PLANE_NOISE_K, WALL_MARGIN
 from core.estimate.plane_openings import still_vertices
 from core.geometry import Box, face_of
 from core.known import measured_outlets
-from core.motion import WithoutMotion, without_motion
+from core.motion import without_motion
 from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.rays.operator import StraightRayOperator, build
 from core.rays.visibility import away_from_walls
@@ -33,7 +34,8 @@ IMAGES, PLANES, SENSORS, OUTLETS = 0, 1, 2, 4
 class ShiftBlocks(eqx.Module):
     """Pooled shifts of one view: `row[w]` is the block of window w, or -1 if the window is left out.
 
-    `cell` is each block's place in the picture, counted in blocks.
+    `cell` is each block's place in the picture, counted in blocks. `shared_px` are independent errors of one standard
+    deviation that blocks share, such as what the camera may have done between the exposures; there may be none.
     """
 
     operator: StraightRayOperator
@@ -42,18 +44,18 @@ class ShiftBlocks(eqx.Module):
     weight: Float[np.ndarray, "windows 2 2"]
     displacement_px: Float[np.ndarray, "blocks 2"]
     variance_px2: Float[np.ndarray, "blocks 2"]
-    still: WithoutMotion | None = None
+    shared_px: Float[np.ndarray, "blocks 2 errors"]
 
     def predicted(self, excess_refractivity: Float[Array, "vx vy vz"]) -> Float[np.ndarray, "blocks 2"]:
         """The blocks' shifts for a refractivity on the operator's vertices."""
         return self.pooled(np.asarray(_apply(self.operator, excess_refractivity)))
 
     def pooled(self, displacement_px: Float[np.ndarray, "windows 2"]) -> Float[np.ndarray, "blocks 2"]:
-        """Information-weighted mean of the windows of each block, without what the camera's motion explains."""
+        """Information-weighted mean of the windows of each block."""
         total = np.zeros_like(self.displacement_px)
         used = self.row >= 0
         np.add.at(total, self.row[used], np.einsum("wij,wj->wi", self.weight, displacement_px)[used])
-        return total if self.still is None else self.still.apply(total)
+        return total
 
 
 @eqx.filter_jit
@@ -87,21 +89,13 @@ def shift_blocks(
         weight,
         np.zeros(total.shape[:2]),
         np.diagonal(covariance, axis1=1, axis2=2).copy(),
+        np.zeros((len(total), 2, 0)),
     )
     errors_px = measured.common_errors_px
-    still = None if errors_px is None else _still(blocks, errors_px, nearly_still(measured))
-    blocks = eqx.tree_at(lambda b: b.still, blocks, still, is_leaf=lambda leaf: leaf is None)
+    if errors_px is not None:
+        shared_px = np.stack([blocks.pooled(error) for error in np.moveaxis(errors_px, -1, 0)], axis=-1)
+        blocks = eqx.tree_at(lambda b: b.shared_px, blocks, shared_px)
     return eqx.tree_at(lambda b: b.displacement_px, blocks, blocks.pooled(measured.displacement_px))
-
-
-def _still(
-    blocks: ShiftBlocks, errors_px: Float[np.ndarray, "windows 2 errors"], measured: ShiftMeasurement
-) -> WithoutMotion:
-    """Takes what windows share out of blocks whose own errors are their noise and what no grid represents."""
-    motions = np.stack([blocks.pooled(errors_px[..., n]) for n in range(errors_px.shape[2])], axis=-1)
-    size_px = REPRESENTATION * float(np.median(np.abs(blocks.pooled(measured.displacement_px))))
-    variance = CORRELATED_DATA * (blocks.variance_px2 + size_px**2)
-    return without_motion(motions, np.einsum("ba,ac->bac", 1.0 / variance, np.eye(2)))
 
 
 def _block_px(room: Box, operator: StraightRayOperator, measured: ShiftMeasurement) -> float:
@@ -158,6 +152,26 @@ class Observations(eqx.Module):
             parts.append(sample(room.velocity_m_s, s.position_m, self.scene.room)[u])
         parts += [room.outflow_excess_k[n : n + 1] for n, *_ in self.outlets]
         return np.concatenate([np.asarray(p, float).ravel() for p in parts] or [np.zeros(0)])
+
+    def unshared(
+        self, values: Float[np.ndarray, "data ..."], variance: Float[np.ndarray, " data"]
+    ) -> Float[np.ndarray, "data ..."]:
+        """Values without what the errors that windows share explain of them, where data have this variance beside.
+
+        Applied to data and to predictions alike, it makes a sum of squares over `variance` one over the whole
+        covariance (`core.motion`).
+        """
+        rest, start = np.array(values, float), 0
+        columns = rest.reshape(len(values), math.prod(rest.shape[1:]))
+        for blocks in self.shifts:
+            own = slice(start, start + blocks.displacement_px.size)
+            start = own.stop
+            if blocks.shared_px.shape[2]:
+                information = np.einsum("ba,ac->bac", 1.0 / variance[own].reshape(-1, 2), np.eye(2))
+                without = without_motion(blocks.shared_px, information)
+                for column in columns.T:
+                    column[own] = without.apply(column[own].reshape(-1, 2)).ravel()
+        return rest
 
     def plane_values(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " blocks"]:
         """A room's temperature on the planes, pooled into their blocks."""

@@ -27,21 +27,39 @@ def corrected(
 
     With a `trust_radius` the room counts as far from the truth (`weighted_variance`).
     """
-    values, variance, group = data.values()
-    residual = values - data.predicted(best.fields) - offset
-    weights = weighted_variance(variance, group, residual, grid_difference, far=trust_radius is not None)
+    residual = data.values()[0] - data.predicted(best.fields) - offset
+    weights = variance_of(data, residual, grid_difference, far=trust_radius is not None)
     return gauss_newton(
-        vector, residual, weights, jacobian, gaussian, all_gaussian=all_gaussian, trust_radius=trust_radius
+        vector,
+        data.unshared(residual, weights),
+        weights,
+        data.unshared(jacobian, weights),
+        gaussian,
+        all_gaussian=all_gaussian,
+        trust_radius=trust_radius,
     )
+
+
+def variance_of(
+    data: Observations,
+    residual: Float[np.ndarray, " data"],
+    grid_difference: Float[np.ndarray, " data"],
+    *,
+    far: bool = False,
+) -> Float[np.ndarray, " data"]:
+    """`weighted_variance` of the data, by what neither the camera nor another shared error explains."""
+    _, noise, group = data.values()
+    residual, grid_difference = (data.unshared(of, noise) for of in (residual, grid_difference))
+    return weighted_variance(noise, group, residual, grid_difference, far=far)
 
 
 def misfit_ratio(
     data: Observations, new: ForwardRun, old: ForwardRun, offset: Float[np.ndarray, " data"] | float = 0.0
 ) -> float:
     """Misfit of a run over that of another, each datum weighted by its noise and the old run's residual."""
-    values, variance, group = data.values()
-    after, before = (values - data.predicted(a.fields) - offset for a in (new, old))
-    weights = weighted_variance(variance, group, before, before)
+    after, before = (data.values()[0] - data.predicted(a.fields) - offset for a in (new, old))
+    weights = variance_of(data, before, before)
+    after, before = (data.unshared(of, weights) for of in (after, before))
     return float(np.sqrt(np.sum(after**2 / weights) / max(np.sum(before**2 / weights), 1e-30)))
 
 

@@ -40,10 +40,9 @@ _DOUBT = 0.5
 class Analysis(eqx.Module):
     """A fitted room with everything that its solution and standard deviations are made of.
 
-    `stated_room` is the room as stated. `derivatives` are those about the fitted room; `stated` may be those over the
-    prior's spread.
-    `coarse`, `first` (on the fine grid) and `other` (another closure) are under the same parameters. `before` is the
-    run under the fitted parameters; `best` is the same run held at the measured level, or profile, of T.
+    `stated_room` is the room as stated. `coarse`, `first` (on the fine grid) and `other` (another closure) are under
+    the same parameters. `before` is the run under the fitted parameters; `best` is the same run held at the measured
+    level, or profile, of T.
     `outlet_std_k` is how far what leaves may be from the air at the outlets' height.
     """
 
@@ -52,7 +51,6 @@ class Analysis(eqx.Module):
     prior: Prior
     posterior: Posterior
     stated_room: RoomFields
-    stated: Derivatives
     derivatives: Derivatives
     coarse: RoomFields
     first: RoomFields
@@ -164,8 +162,6 @@ def _deviation(
     error: ModelError | None,
     extra: tuple[np.ndarray | float, np.ndarray | float] = (0.0, 0.0),
 ) -> Deviation:
-    stated, moved = (
-        of.per_deviation(lambda run: getattr(run, name)) for of in (analysis.stated, analysis.derivatives)
-    )
-    model_std = error.deviation(name, moved) if error else 0.0
-    return deviation(stated, moved, analysis.posterior.covariance, model_std, extra)
+    derivatives = analysis.derivatives.per_deviation(lambda run: getattr(run, name))
+    model_std = error.deviation(name, derivatives) if error else 0.0
+    return deviation(derivatives, analysis.posterior.covariance, model_std, extra)

@@ -21,19 +21,18 @@ class Deviation(eqx.Module):
 
 
 def deviation(
-    stated: Float[np.ndarray, "active vx vy vz ..."],
     derivatives: Float[np.ndarray, "active vx vy vz ..."],
     covariance: Float[np.ndarray, "active active"],
     model_std: Field | float,
     extra: tuple[Field | float, Field | float] = (0.0, 0.0),
 ) -> Deviation:
-    """Combine the three terms; derivatives are per prior deviation, `stated` about the room as stated.
+    """Combine the three terms; derivatives are per prior deviation.
 
     `extra` are the correction's prior and posterior variances.
     """
     roots = np.linalg.cholesky(covariance)
     after = np.sum(np.tensordot(roots.T, derivatives, axes=1) ** 2, axis=0) + extra[1]
-    before = np.sum(stated**2, axis=0) + extra[0]
+    before = np.sum(derivatives**2, axis=0) + extra[0]
     # Where nothing is uncertain, `informed` is 0.
     left = np.square(model_std) + np.finfo(np.float32).tiny
     informed = 1.0 - (after + left) / (before + left)

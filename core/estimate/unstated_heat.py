@@ -23,6 +23,7 @@ import numpy as np
 from jaxtyping import Float
 
 from core.estimate.forward_runs import RoomSettings, march_under
+from core.estimate.image_noise import unshared
 from core.estimate.marches import Marches
 from core.estimate.observation import IMAGES, Observations
 from core.estimate.parameter_fit import Background
@@ -119,7 +120,8 @@ def _warmed(
         warm = eqx.tree_at(lambda p: p.heater_excess_k, mean, mean.heater_excess_k.at[heater].add(heat_k))
         tried = march_under(coarse, warm, flow, settings.restart_s, data.vertices, marches)
         change = data.predicted(tried.fields) - before
-        likeness, scale = matched((values - before)[images], change[images], variance[images])
+        left, change = (unshared(data, of[images]) for of in (values - before, change))
+        likeness, scale = matched(left, change, variance[images])
         if likeness <= best:
             break
         best, best_k, flow = likeness, scale * heat_k, tried.flow.last

@@ -10,10 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from core.checkpoint import digest
-from core.drift import motion_hides
 from core.estimate.alternatives import KEEP_HEAT, left_over, promising_closure, suspected_heat
 from core.estimate.diagnostics import another_closure, missing_heat
-from core.estimate.ensemble import ensemble_fit
 from core.estimate.forward_runs import (
     Derivatives,
     ForwardRun,
@@ -128,8 +126,6 @@ def fitted_room(
     coarse, fine, prior = background.coarse, background.fine, background.prior
     vertices = (settings.vertices, settings.vertices, settings.vertices)
     data = with_noise_seen(data_of(background, problem, settings), background.first.fields)
-    if settings.use_images and any(motion_hides(shift) for shift in problem.shifts):
-        return _by_ensemble(background, data, settings, marches)
     vector, base, linearised = coarse_fit(background, data, settings, marches)
     other = run_under_other_closure(coarse, prior.parameters(vector), base, settings, vertices, marches)
     first = background.first
@@ -159,43 +155,11 @@ def fitted_room(
         found.posterior,
         stated,
         derivatives,
-        derivatives,
         coarse=linearised.start,
         first=first.fields,
         other=other,
         before=before,
         best=best,
-        layout=fine.layout,
-        outlet_std_k=outlet_std_k,
-    )
-
-
-def _by_ensemble(
-    background: Background, data: Observations, settings: RoomSettings, marches: Marches
-) -> Analysis:
-    """The fit where the camera may have moved by more than the air moved the picture."""
-    coarse, fine, prior, vertices = background.coarse, background.fine, background.prior, data.vertices
-    found = ensemble_fit(background, data, settings, marches)
-    parameters = prior.parameters(found.posterior.vector)
-    doing = "march the coarse room as corrected"
-    base = march_under(coarse, parameters, found.flow, settings.restart_s, vertices, marches, doing=doing)
-    other = run_under_other_closure(coarse, parameters, base, settings, vertices, marches)
-    stated = background.first.fields
-    pairs = (other, base.fields), (stated, found.room.fields)
-    outlet_std_k = outlets_apart_k(data, found.room.fields, pairs)
-    return Analysis(
-        background.problem,
-        data,
-        prior,
-        found.posterior,
-        stated,
-        found.stated,
-        found.derivatives,
-        coarse=base.fields,
-        first=found.room.fields,
-        other=other,
-        before=found.room,
-        best=held_fit(fine, prior, data, found.room, found.stated, settings, marches, outlet_std_k),
         layout=fine.layout,
         outlet_std_k=outlet_std_k,
     )

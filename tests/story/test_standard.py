@@ -46,4 +46,4 @@ def test_a_small_surveyed_room_is_found_by_the_command_line_with_velocity_and_pr
     # And it says how wrong it is, but for what so coarse a grid gets wrong.
     assert scores["T_within"] > 0.75
     # Surer than it should be: on one grid of eight cells nothing tells the grid's own error.
-    assert scores["u_within"] > 0.8
+    assert scores["u_within"] > 0.75

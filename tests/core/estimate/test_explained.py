@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from core.estimate.diagnostics import contradictions, misfit, other_way
+from core.estimate.discrepancy import temperature_correction
 from core.estimate.explained import explained, likeness
 from core.estimate.least_squares import Posterior
 from core.estimate.model_error import ModelError
-from core.estimate.observation import observations
+from core.estimate.observation import IMAGES, observations
+from core.motion import CameraMotion
 from core.problem import Problem, ShiftMeasurement
 from core.room.vertices import RoomFields
 from tests.core.estimate.test_temperature_nudging import prior_of, problem
@@ -127,3 +129,41 @@ def test_a_room_is_doubted_for_what_is_more_than_noise_and_more_than_models_diff
 
     assert ("cannot explain these images" in said) == doubted
     assert ("no more than their noise" in said) == (noise > 1.0)
+
+
+def after_a_step(given: Problem, std_px: float) -> Problem:
+    """The same pictures, after the camera moved by as much as it may."""
+    (shift,) = given.shifts
+    camera = given.scene.views[0].camera
+    motion = CameraMotion((camera.width_px, camera.height_px), std_px * np.eye(4))
+    step_px = motion.at(shift.centres_px) @ np.array([1.0, -0.6, 0.4, -0.9])
+    moved = replace(shift, displacement_px=shift.displacement_px + step_px, motion=motion)
+    return replace(given, shifts=(moved,))
+
+
+@pytest.mark.parametrize("std_px", [1e-6, 1e-3, 1.0])
+def test_squares_without_what_windows_share_are_those_of_the_whole_covariance(std_px: float):
+    data = observations(after_a_step(seen(4.0, 0.3), std_px), VERTICES)
+    values, variance, kinds = data.values()
+    shared = np.zeros((len(values), 4))
+    shared[kinds == IMAGES] = data.shifts[0].shared_px.reshape(-1, 4)
+    total = np.diag(variance) + shared @ shared.T
+
+    rest = data.unshared(values, variance)
+    both = data.unshared(np.stack([values, 2.0 * values], axis=1), variance)
+
+    expected = float(values @ np.linalg.solve(total, values))
+    assert float(np.sum(rest**2 / variance)) == pytest.approx(expected, rel=1e-3)
+    np.testing.assert_allclose(both, np.stack([rest, 2.0 * rest], axis=1))
+
+
+@pytest.mark.parametrize("std_px", [1e-9, 1.0, 1e3])
+def test_a_camera_that_moved_by_far_more_than_the_air_did_makes_no_temperature(std_px: float):
+    data, room = observations(after_a_step(seen(4.0, 0.05), std_px), VERTICES), room_of(4.0)
+    values, _, kinds = data.values()
+    residual = np.where(kinds == IMAGES, values - data.predicted(room), 0.0)
+
+    found = temperature_correction(data, room.excess_k, residual, 1.0, 0.1, 0.1)
+
+    # Of 4 K.
+    assert np.abs(found.excess_k).max() < 0.05

@@ -20,6 +20,7 @@ from core.estimate.parameter_step import misfit_ratio
 from core.estimate.posterior import Analysis, solution
 from core.estimate.prior import Prior, room_prior
 from core.geometry import Box, looking_along_y
+from core.motion import CameraMotion
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.result import Solution
@@ -119,9 +120,20 @@ def measured(where: Scene, truth: Solution, noise_px: float) -> Problem:
     return Problem(where, (ShiftMeasurement(centres, shift, information, 16),), (plane,))
 
 
-def test_images_repair_a_supply_that_was_entered_wrongly():
+def after_the_camera_moved(problem: Problem) -> Problem:
+    """The same, after the mount moved the picture by far more than the air did."""
+    (shift,) = problem.shifts
+    motion = CameraMotion((200, 200), 5.0 * np.eye(4))
+    step_px = motion.at(shift.centres_px) @ np.array([0.4, -1.0, 0.7, 0.2])
+    moved = replace(shift, displacement_px=shift.displacement_px + step_px, motion=motion)
+    return replace(problem, shifts=(moved,))
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_images_repair_a_supply_that_was_entered_wrongly(moved: bool):
     wrong = replace(SUPPLY, temperature_k=305.15, velocity_m_s=(0.48, 0.0, 0.0))
     problem = measured(scene(wrong), true_room(scene(SUPPLY)), 1e-5)
+    problem = after_the_camera_moved(problem) if moved else problem
 
     reported: list[dict] = []
     found = solve_room(problem, SETTINGS, Watch(lambda row, growing: reported.append(row)))
