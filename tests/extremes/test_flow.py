@@ -127,7 +127,7 @@ def uncertain(
 
     def run() -> np.ndarray:
         slope = np.full((1, 3, 3, 3), derivative)
-        found = deviation(slope, slope, np.array([[covariance]]), np.full((3, 3, 3), difference))
+        found = deviation(slope, np.array([[covariance]]), np.full((3, 3, 3), difference))
         return np.stack([found.std, found.informed], axis=-1)
 
     expected = Near(np.broadcast_to([std, informed], (3, 3, 3, 2)), rel=1e-6, abs=1e-9)
