@@ -6,8 +6,8 @@ The correction is constant along y, the direction of view, since one view sees o
 K has three parts: errors of the profile over height, local errors in the x-z section, and an error of the
 level (the mean). Images do not see the level; thermometers do (a plane, outlets, sensors). A plane on a wall
 of unknown temperature lies in that wall's thermal layer, which the model may have wrong by one constant: that
-constant is estimated too. Walls of stated temperature keep it. So are the errors that the windows of a picture share,
-such as what the camera may have done. The velocity is not corrected.
+constant is estimated too. Walls of stated temperature keep it. The errors that the windows of a picture share, such
+as what the camera may have done, are marginalised. The velocity is not corrected.
 
 How large the correction may be follows from the residual itself, by its marginal likelihood: a room that the data
 contradict is corrected further, and is less certain, than one that they confirm. The error of images and planes
@@ -59,7 +59,7 @@ class Correction(eqx.Module):
 
 
 class _Residuals(eqx.Module):
-    """Residuals of one kind and their derivatives in the coefficients, the planes' layers and the shared errors.
+    """Residuals of one kind, derivatives in the coefficients and the planes' layers, and errors that they share.
 
     `start` is the kind's error beyond noise from which the search begins; None: thermometers, which read one point
     where the correction is a mean along y.
@@ -68,6 +68,7 @@ class _Residuals(eqx.Module):
     residual: Float[np.ndarray, " data"]
     noise: Float[np.ndarray, " data"]
     design: Float[np.ndarray, "data unknowns"]
+    shared: Float[np.ndarray, "data errors"]
     start: float | None
 
 
@@ -104,10 +105,9 @@ def temperature_correction(
     kinds = _kinds(data, excess_k, residual, basis, unknown_walls, outlet_std_k)
     layers = sum(plane.wall in unknown_walls for plane in data.planes)
     layer_k2 = np.eye(layers) * (_LAYER_SHARE * departure_k) ** 2
-    shared = np.eye(_shared_errors(data).shape[1])
 
     def prior_k2(std_k: float) -> np.ndarray:
-        return np.asarray(block_diag(_prior_k2(std_k) + level_std_k**2, layer_k2, shared))
+        return np.asarray(block_diag(_prior_k2(std_k) + level_std_k**2, layer_k2))
 
     std_k, errors = _sizes(kinds, prior_k2, wrong_share * departure_k * float(np.sqrt(_SEEN_SHARE)))
     prior = prior_k2(std_k)
@@ -141,15 +141,14 @@ def _kinds(
     ):
         own = group == g
         if own.any():
-            others = (
-                columns if g == of else np.zeros((len(design), columns.shape[1]))
-                for of, columns in ((PLANES, layers), (IMAGES, shared))
-            )
+            extra = layers if g == PLANES else np.zeros((len(design), layers.shape[1]))
+            unknowns = np.concatenate([design, extra], axis=1)
+            common = shared if g == IMAGES else np.zeros((len(design), 0))
             # A hundredth of the noise at least: the search begins above zero where a room fits exactly.
             least = 0.01 * float(np.sqrt(np.median(variance[own])))
             start = max(0.5 * spread(own_errors[own]), least) if g in (IMAGES, PLANES) else None
             noise = variance[own] + (outlet_std_k**2 if g == OUTLETS else 0.0)
-            found.append(_Residuals(residual[own], noise, np.concatenate([design, *others], axis=1), start))
+            found.append(_Residuals(residual[own], noise, unknowns, common, start))
     return found
 
 
@@ -194,13 +193,18 @@ def _fit(
         pooled = kind.start is not None
         variance = kind.noise + (next(left) ** 2 if pooled else point_k2)
         count = 1.0 / _CORRELATED if pooled else 1.0
-        weight = count / variance
-        known = known + (kind.design.T * weight) @ kind.design
-        gained = gained + (kind.design.T * weight) @ kind.residual
-        unlikely += count * float(np.log(variance).sum()) + float(weight @ kind.residual**2)
-    # Scaled: pictures tell a motion of a pixel to a millionth of it.
-    scale = 1.0 / np.sqrt(np.diagonal(known))
-    covariance = np.linalg.inv(known * np.outer(scale, scale)) * np.outer(scale, scale)
+        root = np.sqrt(count / variance)[:, None]
+        # What is shared is marginalised (`core.motion`).
+        along, size, _ = np.linalg.svd(root * kind.shared, full_matrices=False)
+        share = 1.0 - 1.0 / np.sqrt(1.0 + size**2)
+        design, residual = root * kind.design, root[:, 0] * kind.residual
+        design, residual = (of - (along * share) @ (along.T @ of) for of in (design, residual))
+        known = known + design.T @ design
+        gained = gained + design.T @ residual
+        unlikely += count * float(np.log(variance).sum()) + float(
+            np.log1p(size**2).sum() + residual @ residual
+        )
+    covariance = np.linalg.inv(known)
     mean = covariance @ gained
     unlikely += float(np.linalg.slogdet(known)[1] + np.linalg.slogdet(prior)[1]) - float(gained @ mean)
     return _Fitted(mean, covariance, -0.5 * unlikely)

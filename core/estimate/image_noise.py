@@ -9,8 +9,6 @@ What a room predicts is taken off first: shifts grow towards the wall's end of t
 wall sees a gradient that is slightly bent. Of what a room leaves that is small.
 """
 
-from collections.abc import Iterator
-
 import equinox as eqx
 import numpy as np
 from jaxtyping import Float, Int
@@ -55,7 +53,7 @@ def images(data: Observations, fields: RoomFields) -> Images:
     values, predicted = (unshared(data, of[shown]) for of in (values, data.predicted(fields)))
     variance = variance[shown].copy()
     doubt = 0.0
-    for blocks, own in _views(data):
+    for blocks, own in data.views():
         factor, known = noise_factor(blocks, (values - predicted)[own].reshape(-1, 2))
         variance[own] *= factor
         doubt += (known * float(variance[own].sum())) ** 2
@@ -65,7 +63,7 @@ def images(data: Observations, fields: RoomFields) -> Images:
 def with_noise_seen(data: Observations, fields: RoomFields) -> Observations:
     """The data, their images' noise as what these fields leave of them shows."""
     seen, scaled = images(data, fields), []
-    for blocks, own in _views(data):
+    for blocks, own in data.views():
         variance = seen.variance_px2[own].reshape(-1, 2)
         scaled.append(eqx.tree_at(lambda of: of.variance_px2, blocks, variance))
     return eqx.tree_at(lambda of: of.shifts, data, tuple(scaled))
@@ -74,21 +72,12 @@ def with_noise_seen(data: Observations, fields: RoomFields) -> Observations:
 def unshared(data: Observations, shifts_px: Float[np.ndarray, " shifts"]) -> Float[np.ndarray, " shifts"]:
     """Shifts of all views without the errors that windows share, fitted to them at any size."""
     rest = shifts_px.copy()
-    for blocks, own in _views(data):
+    for blocks, own in data.views():
         if blocks.shared_px.shape[2]:
             std = np.sqrt(blocks.variance_px2).ravel()
             shared, *_ = svd(blocks.shared_px.reshape(len(std), -1) / std[:, None], full_matrices=False)
             rest[own] -= std * (shared @ (shared.T @ (shifts_px[own] / std)))
     return rest
-
-
-def _views(data: Observations) -> Iterator[tuple[ShiftBlocks, slice]]:
-    """Each view's blocks, and where their shifts stand among those of all views."""
-    start = 0
-    for blocks in data.shifts:
-        own = slice(start, start + blocks.displacement_px.size)
-        yield blocks, own
-        start = own.stop
 
 
 def noise_factor(blocks: ShiftBlocks, left_px: Float[np.ndarray, "blocks 2"]) -> tuple[float, float]:

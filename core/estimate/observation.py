@@ -5,7 +5,7 @@ are left out: the thermal layer there is thinner than a cell. A plane of known T
 its noise; the fit adds the representation error.
 """
 
-import math
+from collections.abc import Iterator
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -119,6 +119,14 @@ class Observations(eqx.Module):
     outlets: tuple[tuple[int, Outlet, float], ...] = eqx.field(static=True)
     vertices: tuple[int, int, int] = eqx.field(static=True)
 
+    def views(self) -> Iterator[tuple[ShiftBlocks, slice]]:
+        """Each view's blocks, and where their shifts stand among the data: these begin with them."""
+        start = 0
+        for blocks in self.shifts:
+            own = slice(start, start + blocks.displacement_px.size)
+            yield blocks, own
+            start = own.stop
+
     def values(
         self,
     ) -> tuple[Float[np.ndarray, " data"], Float[np.ndarray, " data"], Int[np.ndarray, " data"]]:
@@ -161,16 +169,15 @@ class Observations(eqx.Module):
         Applied to data and to predictions alike, it makes a sum of squares over `variance` one over the whole
         covariance (`core.motion`).
         """
-        rest, start = np.array(values, float), 0
-        columns = rest.reshape(len(values), math.prod(rest.shape[1:]))
-        for blocks in self.shifts:
-            own = slice(start, start + blocks.displacement_px.size)
-            start = own.stop
+        rest = np.array(values, float)
+        for blocks, own in self.views():
             if blocks.shared_px.shape[2]:
                 information = np.einsum("ba,ac->bac", 1.0 / variance[own].reshape(-1, 2), np.eye(2))
                 without = without_motion(blocks.shared_px, information)
-                for column in columns.T:
-                    column[own] = without.apply(column[own].reshape(-1, 2)).ravel()
+                out, along = (
+                    of.reshape(blocks.displacement_px.size, -1) for of in (without.out, without.along)
+                )
+                rest[own] -= out @ (along.T @ rest[own])
         return rest
 
     def plane_values(self, excess_k: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " blocks"]:
