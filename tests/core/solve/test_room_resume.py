@@ -62,18 +62,38 @@ def whole(problem: Problem, questions: Asked, rows: list[dict]) -> Solution:
     return solve_room(problem, settings, Watch(lambda row, growing: rows.append(dict(row)), questions))
 
 
-def stopped(problem: Problem, store: dict, asked: Asked) -> None:
+def stopped(problem: Problem, store: dict, asked: Asked) -> list[str]:
+    """What it said that it did until it was stopped."""
+    told: list[str] = []
+    watch = Watch(lambda row, growing: told.append(str(row["doing"])), asked, store)
     with pytest.raises(StoppedError):
-        solve_room(problem, SETTINGS, Watch(should_stop=asked, store=store))
+        solve_room(problem, SETTINGS, watch)
+    return told
 
 
-def test_stopped_at_any_chunk_it_goes_on_to_bitwise_the_same_end(
+def kept(store: dict) -> set[str]:
+    """Kinds of what is kept: the end of a march, or one that was cut."""
+    return {name.split("-")[0] for name in store} & {"march", "cut"}
+
+
+def test_stopped_anywhere_it_goes_on_to_bitwise_the_same_end(
     problem: Problem, whole: Solution, questions: Asked
 ):
-    # At the first question, in the first march, at places all over the fit, and at the last question.
-    for n in [0, 2, *np.linspace(5, questions.count - 2, 4, dtype=int), questions.count - 1]:
+    cut, some = {"cut"}, {"march"}
+    for n, doing, allowed in (
+        # Before anything is kept.
+        (0, "", [set()]),
+        # In the first march, after a window of it.
+        (2, "march the coarse room", [cut]),
+        # While two threads march, whether or not either has a window to keep.
+        (questions.count // 4, "move one parameter", [some, some | cut]),
+        # At the last question: in a march that holds temperatures, all others ended.
+        (questions.count - 1, "hold the temperatures", [some | cut]),
+    ):
         store: dict[str, bytes] = {}
-        stopped(problem, store, Asked(n))
+        told = stopped(problem, store, Asked(n))
+        assert ["", *told][-1].startswith(doing)
+        assert kept(store) in allowed
         resumed = solve_room(problem, SETTINGS, Watch(store=store))
         same(resumed, whole)
         assert timeless(resumed) == timeless(whole)
