@@ -20,6 +20,8 @@ demo: setup
 	$(BIN)/airlens demo
 
 # One worker more than cores: tests wait for browsers, devices and other processes a quarter of their time.
+# One thread of BLAS each: on a busy core two wait for one another, ten times as long as they work.
+test: export OPENBLAS_NUM_THREADS := 1
 test: setup chromium
 	$(BIN)/python -m pytest -n $$(($(CORES) + 1)) --dist loadscope
 
