@@ -129,12 +129,14 @@ def two_steps(flow: Flow, model: RoomModel, dt_s: Float[Array, ""]) -> Flow:
     viscosity = model.viscosity(Flow(flow.velocity, flow.excess_k, flow.pressure_m2_s2, turbulence))
 
     def once(_: Int[Array, ""], air: tuple[Velocity, Cells, Cells]) -> tuple[Velocity, Cells, Cells]:
-        after = step(Flow(*air, turbulence), viscosity, model, dt_s)
+        velocity, excess_k, pressure_m2_s2 = air
+        after = step(Flow(velocity, excess_k, pressure_m2_s2, turbulence), viscosity, model, dt_s)
         return after.velocity, after.excess_k, after.pressure_m2_s2
 
     # A loop compiles the step once; turbulence stays out of what it carries, and is not copied.
-    air = lax.fori_loop(0, 2, once, (flow.velocity, flow.excess_k, flow.pressure_m2_s2))
-    return Flow(*air, turbulence)
+    start = flow.velocity, flow.excess_k, flow.pressure_m2_s2
+    velocity, excess_k, pressure_m2_s2 = lax.fori_loop(0, 2, once, start)
+    return Flow(velocity, excess_k, pressure_m2_s2, turbulence)
 
 
 def longest_step_s(flow: Flow, model: RoomModel, courant: float) -> Float[Array, ""]:
