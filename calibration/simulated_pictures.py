@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Float32, Shaped
 
-from calibration.lens import directions
 from core.geometry import Optics
+from core.lens import directions
 
 
 @dataclass(frozen=True)

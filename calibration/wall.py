@@ -14,9 +14,9 @@ from jaxtyping import Bool, Float
 from calibration.adjustment import Device
 from calibration.errors import ImageError
 from calibration.graycode import Decoded
-from calibration.lens import directions
 from calibration.local import on_panel
 from calibration.stripes import EdgeMap
+from core.lens import directions
 
 MINIMUM_POINTS = 30
 # Squared sine of the angle between two rays: a baseline of a millionth of the distance.

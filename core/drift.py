@@ -1,69 +1,54 @@
-"""A small motion of the whole picture between two exposures: what a camera on its mount may do.
+"""A small motion of the camera between two exposures: what it may do on its mount.
 
 Fitted to windows that are known to be still, and taken out of the reference picture. What stays unknown of it is
 `core.motion`.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy import ndimage
 
 from core.data_error import CORRELATED_DATA
-from core.motion import likeliest_motion, similarity_basis
+from core.geometry import Optics
+from core.motion import MOTIONS, likeliest_motion, motion_basis
 from core.problem import ShiftMeasurement
-from core.setting import setting
 
 Image = Float[np.ndarray, "rows cols"]
+# A motion of the camera, as the six of `motion_basis` [px].
+Motion = Float[np.ndarray, " 6"]
+STILL: Motion = np.zeros(MOTIONS)
+Powers = Callable[[Float[np.ndarray, " points"]], Float[np.ndarray, "points powers"]]
 
 
 # Of the robust fit: each round's weights are by the last one's residual.
 _ROUNDS = 5
+# Of a picture: rows moved at a time, and the degree of the polynomials that a motion is written in.
+_ROWS, _POWERS = 256, 9
+# The picture goes on so far beyond its edge: what an edge does to a spline's coefficients is gone by then.
+_EDGE_PX = 12
 
 
-@setting
-class Similarity:
-    """A small motion of the whole image about its centre: shift [px], rotation [rad], scale - 1."""
+def fit_motion(
+    measurement: ShiftMeasurement,
+    still: Bool[np.ndarray, " windows"],
+    optics: Optics,
+    expected_px: Motion,
+    std_px: float,
+) -> tuple[Motion, Float[np.ndarray, "6 6"]]:
+    """The likeliest motion of the camera by the windows where `still` is true, and its covariance.
 
-    column_px: float = 0.0
-    row_px: float = 0.0
-    rotation_rad: float = 0.0
-    dilation: float = 0.0
-
-    def displacement_px(
-        self, points_px: Float[np.ndarray, "points 2"], shape: tuple[int, int]
-    ) -> Float[np.ndarray, "points 2"]:
-        """Displacement (column, row) of image points, to first order in the angle and the dilation."""
-        return similarity_basis(points_px, shape) @ np.array(
-            [self.column_px, self.row_px, self.rotation_rad, self.dilation]
-        )
-
-    def after(self, first: "Similarity") -> "Similarity":
-        """Both motions, to first order."""
-        return Similarity(
-            column_px=self.column_px + first.column_px,
-            row_px=self.row_px + first.row_px,
-            rotation_rad=self.rotation_rad + first.rotation_rad,
-            dilation=self.dilation + first.dilation,
-        )
-
-
-def fit_similarity(
-    measurement: ShiftMeasurement, static: np.ndarray, shape: tuple[int, int]
-) -> tuple[Similarity, Float[np.ndarray, "4 4"]]:
-    """Weighted fit over the windows where `static` is true: the motion and its covariance."""
-    basis = similarity_basis(measurement.centres_px[static], shape)
-    information = measurement.information_per_px2[static]
-    weighted = np.einsum("wab,wbp->wap", information, basis)
-    normal = np.einsum("wap,waq->pq", basis, weighted)
-    # Scaled, since a radian moves a window by a thousand pixels.
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
-    inverse = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-10) / np.outer(scale, scale)
-    solution = inverse @ np.einsum("wap,wa->p", weighted, measurement.displacement_px[static])
-    column, row, rotation, dilation = (float(v) for v in solution)
-    return Similarity(column_px=column, row_px=row, rotation_rad=rotation, dilation=dilation), inverse
+    Before the windows are looked at each of the six motions has the mean `expected_px` and the deviation `std_px`.
+    """
+    basis = std_px * motion_basis(measurement.centres_px[still], optics)
+    weighted = np.einsum("wab,wbp->wap", measurement.information_per_px2[still], basis)
+    covariance = np.linalg.inv(np.einsum("wap,waq->pq", basis, weighted) + np.eye(MOTIONS))
+    left = measurement.displacement_px[still] - basis @ (expected_px / std_px)
+    found = std_px * covariance @ np.einsum("wap,wa->p", weighted, left)
+    return expected_px + found, std_px**2 * covariance
 
 
 def nearly_still(measurement: ShiftMeasurement) -> ShiftMeasurement:
@@ -84,16 +69,44 @@ def nearly_still(measurement: ShiftMeasurement) -> ShiftMeasurement:
     return replace(measurement, displacement_px=left)
 
 
-def move_image(image: Image, motion: Similarity) -> Image:
-    """`image` as it looks after `motion`, by a quintic spline (edges are repeated).
+def move_image(image: Image, motion_px: Motion, optics: Optics) -> Image:
+    """`image` as it looks after a motion of its camera, by a quintic spline (edges are repeated).
 
     Only a prediction is moved (the reference, to where the flow image should be); measured flow frames
     are never resampled.
     """
-    centre = (np.array(image.shape) - 1) / 2
-    c, s = np.cos(motion.rotation_rad), np.sin(motion.rotation_rad)
-    # From output (row, column) to input: undo the motion.
-    inverse = np.array([[c, -s], [s, c]]) / (1 + motion.dilation)
-    shift = np.array([motion.row_px, motion.column_px])
-    offset: Any = centre - inverse @ (centre + shift)
-    return ndimage.affine_transform(image, inverse, offset=offset, order=5, mode="nearest")
+    single: Any = np.float32
+    padded = np.pad(image, _EDGE_PX, mode="edge")
+    coefficients = ndimage.spline_filter(padded, order=5, output=single, mode="nearest")
+    moved, columns = np.empty(image.shape, np.float32), np.arange(image.shape[1], dtype=float)
+    by_column, by_row, back = _way_back(motion_px, optics, image.shape)
+    for first in range(0, image.shape[0], _ROWS):
+        rows = np.arange(first, min(first + _ROWS, image.shape[0]), dtype=float)
+        column, row = np.einsum("rb,abc->arc", by_row(rows), back) @ by_column(columns).T
+        was = [row + (rows[:, None] + _EDGE_PX), column + (columns + _EDGE_PX)]
+        moved[first : first + len(rows)] = ndimage.map_coordinates(
+            coefficients, was, order=5, mode="nearest", prefilter=False
+        )
+    return moved
+
+
+def _way_back(
+    motion_px: Motion, optics: Optics, shape: tuple[int, ...]
+) -> tuple[Powers, Powers, Float[np.ndarray, "2 powers powers"]]:
+    """From a pixel to where it was before a motion: polynomials along both, and their products' coefficients.
+
+    They hold the motion of any lens to a ten-thousandth of it.
+    """
+    nodes = np.polynomial.chebyshev.chebpts1(_POWERS + 3)
+    powers = np.polynomial.chebyshev.chebvander(nodes, _POWERS)
+    column, row = ((nodes + 1.0) / 2.0 * (length - 1) for length in shape[::-1])
+    points = np.stack(np.meshgrid(column, row), axis=-1).reshape(-1, 2)
+    # A motion of some pixels hardly changes over some pixels.
+    once = points - motion_basis(points, optics) @ motion_px
+    back = -(motion_basis(once, optics) @ motion_px).reshape(len(nodes), len(nodes), 2)
+    inverse = np.linalg.pinv(powers)
+
+    def along(length: int) -> Powers:
+        return lambda at: np.polynomial.chebyshev.chebvander(2.0 * at / max(length - 1, 1) - 1.0, _POWERS)
+
+    return along(shape[1]), along(shape[0]), np.einsum("br,rca,dc->abd", inverse, back, inverse)

@@ -1,8 +1,8 @@
 """What the camera may have done between the exposures: a small motion of the whole picture that nobody knows.
 
-A mount creeps, a lens breathes. The picture then moves by a shift, a rotation and a magnification, which hide a part
-of what the air does (a linear profile of temperature moves the whole picture by one vector). The shifts d of the
-windows therefore have the covariance
+A mount creeps, a lens breathes. The camera then turns, rolls and magnifies, and its sensor is carried behind the
+lens. That hides a part of what the air does (a linear profile of temperature moves the whole picture by one vector).
+The shifts d of the windows therefore have the covariance
 
     C = information^-1 + B B^T,     B: the motions of one standard deviation, at the windows.
 
@@ -15,39 +15,58 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 
+from core.geometry import Optics
+from core.lens import on_plane, seen_at
+
+MOTIONS = 6
+# Step of a difference on the plane at distance 1.
+_STEP = 1e-4
+
 Shifts = Float[np.ndarray, "windows 2"]
 
 
-def similarity_basis(
-    points_px: Float[np.ndarray, "points 2"], shape: tuple[int, int]
-) -> Float[np.ndarray, "points 2 4"]:
-    """Displacement by a unit of (column, row, rotation, dilation), about the centre of a picture of rows, columns."""
-    x, y = (points_px - (np.array(shape[::-1]) - 1) / 2).T
+def motion_basis(points_px: Float[np.ndarray, "points 2"], optics: Optics) -> Float[np.ndarray, "points 2 6"]:
+    """Displacement of points (column, row) of a picture by a unit of each of the camera's six motions.
+
+    Sensor and lens are carried apart, to the right and down [px]; the lens's focal length grows [px at the picture's
+    edge]; the camera rolls [px at the edge], and turns to the side and up [px on the optical axis]. A picture that is
+    turned moves further at its edges than in its middle: by 1 + x^2 along x and x y along y, on the plane at
+    distance 1.
+    """
+    centre, half = np.array(optics.principal_px), max(optics.width_px, optics.height_px) / 2
+    plane, focal_px = on_plane(optics, points_px), np.array(optics.focal_px)
+    x, y = plane.T
+    rolled = np.stack([-y, x], -1) / half * focal_px.mean()
+    turned = np.stack([1.0 + x * x, x * y], -1), np.stack([x * y, 1.0 + y * y], -1)
     one, zero = np.ones_like(x), np.zeros_like(x)
-    return np.stack([np.stack([one, zero, -y, x], -1), np.stack([zero, one, x, y], -1)], axis=-2)
 
+    def through_lens(way: Float[np.ndarray, "points 2"]) -> Float[np.ndarray, "points 2"]:
+        ahead, behind = (seen_at(optics, plane + step * way) for step in (_STEP, -_STEP))
+        return (ahead - behind) / (2.0 * _STEP)
 
-def edge_basis(
-    points_px: Float[np.ndarray, "points 2"], size_px: tuple[int, int]
-) -> Float[np.ndarray, "points 2 4"]:
-    """`similarity_basis` with rotation and magnification in px at the edge of a picture of columns, rows."""
-    half = max(size_px) / 2
-    return similarity_basis(points_px, (size_px[1], size_px[0])) / np.array([1.0, 1.0, half, half])
+    columns = [
+        np.stack([one, zero], -1),
+        np.stack([zero, one], -1),
+        (points_px - centre) / half,
+        through_lens(rolled / focal_px.mean()),
+        *(through_lens(way / f) for way, f in zip(turned, focal_px, strict=True)),
+    ]
+    return np.stack(columns, axis=-1)
 
 
 class CameraMotion(eqx.Module):
-    """The unknown motion of one view's picture.
+    """The unknown motion of one view's camera.
 
-    The columns of `root_px` are independent motions of one standard deviation, each as its shift along columns and
-    rows, rotation and magnification [px at the picture's edge]. The motion's covariance is root_px root_px^T.
+    The columns of `root_px` are independent motions of one standard deviation, each as the six of `motion_basis`. The
+    motion's covariance is root_px root_px^T.
     """
 
-    size_px: tuple[int, int] = eqx.field(static=True)
-    root_px: Float[np.ndarray, "4 4"]
+    optics: Optics = eqx.field(static=True)
+    root_px: Float[np.ndarray, "6 motions"]
 
-    def at(self, points_px: Float[np.ndarray, "points 2"]) -> Float[np.ndarray, "points 2 4"]:
+    def at(self, points_px: Float[np.ndarray, "points 2"]) -> Float[np.ndarray, "points 2 motions"]:
         """What each motion of one standard deviation does at points (column, row)."""
-        return edge_basis(points_px, self.size_px) @ self.root_px
+        return motion_basis(points_px, self.optics) @ self.root_px
 
 
 class WithoutMotion(eqx.Module):
@@ -84,10 +103,10 @@ def without_motion(
 
 
 def likeliest_motion(
-    motions_px: Float[np.ndarray, "windows 2 4"],
+    motions_px: Float[np.ndarray, "windows 2 motions"],
     information_per_px2: Float[np.ndarray, "windows 2 2"],
     shifts_px: Shifts,
-) -> Float[np.ndarray, " 4"]:
+) -> Float[np.ndarray, " motions"]:
     """The motion, in standard deviations, that is likeliest if the air is still."""
     weighted = np.einsum("wab,wbp->wap", information_per_px2, motions_px)
     normal = np.einsum("wap,waq->pq", motions_px, weighted) + np.eye(motions_px.shape[2])

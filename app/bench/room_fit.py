@@ -18,7 +18,7 @@ from app.volume.file import RoomVolume, read_volume
 from app.volume.measurement import synthetic_problem
 from app.volume.scene import RIG_PLACES, Information, RigName, RigOptions
 from app.volume.score import coverage, score_solution
-from core.motion import CameraMotion
+from core.motion import MOTIONS, CameraMotion
 from core.problem import Problem
 from core.scene import FlowModel, Inlet, Scene
 from core.solve.room import RoomSettings, solve_room
@@ -97,11 +97,10 @@ def problem_of(
 
 
 def moved(problem: Problem, drift_px: float, seed: int) -> Problem:
-    """The problem after the camera moved, in each of its four ways, by a draw; known is its deviation alone."""
+    """The problem after the camera moved, in each of its six ways, by a draw; known is its deviation alone."""
     (shift,) = problem.shifts
-    camera = problem.scene.views[0].camera
-    motion = CameraMotion((camera.width_px, camera.height_px), drift_px * np.eye(4))
-    step_px = motion.at(shift.centres_px) @ np.random.default_rng([seed, 77]).standard_normal(4)
+    motion = CameraMotion(problem.scene.views[0].camera, drift_px * np.eye(MOTIONS))
+    step_px = motion.at(shift.centres_px) @ np.random.default_rng([seed, 77]).standard_normal(MOTIONS)
     shift = replace(shift, displacement_px=shift.displacement_px + step_px, motion=motion)
     return replace(problem, shifts=(shift,))
 

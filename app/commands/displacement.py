@@ -44,7 +44,7 @@ def displacement(
         "median_px": float(np.median(size)),
         "p99_px": float(np.percentile(size, 99)),
         "median_std_px": float(np.median(field.std_px)),
-        "drift_px": [field.drift.column_px, field.drift.row_px] if field.drift else None,
+        "drift_px": None if field.drift_px is None else field.drift_px.tolist(),
     }
     if as_json:
         typer.echo(json.dumps(summary, indent=1))

@@ -11,7 +11,8 @@ import xarray as xr
 from app.errors import BadInputError
 from app.files.durable import durable_path
 from app.files.reading import reading
-from core.motion import CameraMotion
+from core.geometry import Optics
+from core.motion import MOTIONS, CameraMotion
 from core.problem import ShiftMeasurement
 
 
@@ -75,17 +76,28 @@ def _shift(data: xr.Dataset) -> ShiftMeasurement:
 
 
 def _motion_attributes(motion: CameraMotion | None) -> dict[str, Any]:
-    """The camera's unknown motion: its picture, and the motions of one standard deviation, one after the other."""
+    """The camera's unknown motion: its lens, and the motions of one standard deviation, one after the other."""
     if motion is None:
         return {}
-    return {"picture_px": list(motion.size_px), "camera_motions_px": motion.root_px.T.ravel()}
+    lens = motion.optics
+    return {
+        "picture_px": [lens.width_px, lens.height_px],
+        "lens": [*lens.focal_px, *lens.principal_px, *lens.distortion],
+        "camera_motions_px": motion.root_px.T.ravel(),
+    }
 
 
 def _motion(attributes: Mapping[str, Any]) -> CameraMotion | None:
     if "camera_motions_px" not in attributes:
         return None
     width_px, height_px = (int(v) for v in attributes["picture_px"])
-    return CameraMotion((width_px, height_px), np.reshape(attributes["camera_motions_px"], (4, 4)).T)
+    fx, fy, cx, cy, k1, k2, p1, p2, k3 = (float(v) for v in attributes["lens"])
+    # Where the camera stands does not matter to how its picture moves.
+    lens = Optics(
+        width_px=width_px, height_px=height_px, focal_px=(fx, fy), principal_px=(cx, cy),
+        position_m=(0.0, 0.0, 0.0), rotation_rad=(0.0, 0.0, 0.0), distortion=(k1, k2, p1, p2, k3),
+    )  # fmt: skip
+    return CameraMotion(lens, np.reshape(attributes["camera_motions_px"], (-1, MOTIONS)).T)
 
 
 def read_shifts(folder: Path) -> tuple[ShiftMeasurement, ...]:

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from app.reconstruct.yardstick import (
     Exposures,
     Mask,
+    MotionPrior,
     Rigid,
     Trusted,
     Yardstick,
@@ -21,47 +22,41 @@ from app.reconstruct.yardstick import (
     read_motion,
     trusted,
 )
-from core.drift import Similarity
-from core.motion import CameraMotion
+from core.drift import STILL, Motion
+from core.geometry import Optics
+from core.motion import MOTIONS, CameraMotion, motion_basis
 from core.problem import ShiftMeasurement
 
 # A motion is never known better than this.
 _LEAST_PX = 1e-4
 
 
-@dataclass(frozen=True)
-class MotionPrior:
-    """What is known of the camera's motion before this pair of pictures is looked at: mean, and one deviation [px].
-
-    `source` says where it comes from.
-    """
-
-    mean: Similarity
-    std_px: float
-    source: str
+# Two references tell a motion of any size.
+_UNBOUND_PX = 100.0
 
 
 def mount(drift_std_px: float) -> MotionPrior:
     """By the mount's stability alone."""
-    return MotionPrior(Similarity(), drift_std_px, f"the mount's stability: {drift_std_px:g} px")
+    return MotionPrior(STILL, drift_std_px, f"the mount's stability: {drift_std_px:g} px")
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How the camera moved between two references, and whether that explains how they differ."""
+    """How the camera moved between two references, and whether that explains how they differ.
 
-    drift: Similarity
-    edge_px: Float[np.ndarray, " 4"]
+    `middle_px` is how far the middle of the picture moved, and `typical_px` how far its windows did (rms).
+    """
+
+    drift_px: Motion
+    middle_px: Float[np.ndarray, " 2"]
+    typical_px: float
     unlike: float
     agree: bool
 
     @property
     def said(self) -> str:
         """In words, with what to do."""
-        moved = (
-            f"Between the references the camera moved by {self.drift.column_px:+.3f} px across, "
-            f"{self.drift.row_px:+.3f} px down, {1e6 * self.drift.rotation_rad:+.0f} urad."
-        )
+        moved = f"Between the references the camera moved: {_moved(self.middle_px, self.drift_px)}."
         if self.agree:
             return moved
         return (
@@ -72,23 +67,21 @@ class Agreement:
 
     def at(self, share: float) -> MotionPrior:
         """The motion after a share of the time between the references: a random walk with both ends known."""
-        first = Similarity(
-            column_px=share * self.drift.column_px,
-            row_px=share * self.drift.row_px,
-            rotation_rad=share * self.drift.rotation_rad,
-            dilation=share * self.drift.dilation,
-        )
-        step_px = float(np.sqrt(np.mean(self.edge_px**2)))
-        std_px = max((share * (1 - share)) ** 0.5 * step_px, _LEAST_PX)
-        return MotionPrior(first, std_px, f"two references, {step_px:.3f} px apart: {std_px:.3f} px")
+        std_px = max((share * (1 - share)) ** 0.5 * self.typical_px, _LEAST_PX)
+        source = f"two references, {self.typical_px:.3f} px apart: {std_px:.3f} px"
+        return MotionPrior(share * self.drift_px, std_px, source)
 
 
 def agreement(before: Exposures, in_room: Mask) -> Agreement:
     """Two references, seen through still air: every window of the wall is a yardstick."""
-    read, half = read_motion(before, in_room), max(before.size_px) / 2
-    total = read.motion
-    edge_px = np.array([total.column_px, total.row_px, half * total.rotation_rad, half * total.dilation])
-    return Agreement(total, edge_px, read.unlike, read.is_rigid)
+    read = read_motion(before, in_room, mount(_UNBOUND_PX))
+    if read is None:
+        return Agreement(STILL, np.zeros(2), 0.0, 0.0, True)
+    basis = motion_basis(read.shift.centres_px[in_room], before.optics)
+    typical_px = float(np.sqrt(np.mean(np.sum((basis @ read.motion_px) ** 2, axis=1))))
+    return Agreement(
+        read.motion_px, _of_middle(read.motion_px, before.optics), typical_px, read.unlike, read.is_rigid
+    )
 
 
 def without_known_drift(
@@ -97,59 +90,65 @@ def without_known_drift(
     border: Mask,
     prior: MotionPrior,
     marks: Sequence[Yardstick] = (),
-) -> tuple[ShiftMeasurement, Similarity, str]:
+) -> tuple[ShiftMeasurement, Motion, str]:
     """The shift of every window, the motion that was taken out of it, and a sentence on it.
 
     `in_room` are the windows on the back wall, `border` those beyond it that may be still; `marks` come first.
     """
-    still = trusted(exposures, marks) if marks else Trusted((), None, ())
-    said = "".join(f"{why} " for why in still.refused)
-    if still.read is not None:
-        if still.read.std_px < prior.std_px:
-            return _known(exposures, still.read, said, f"the {_listed(still.names)}")
-        said += f"The {_listed(still.names)} show too little to tell the camera's motion. "
-    read = read_motion(exposures, border)
-    known = read.std_px < prior.std_px
-    if known and read.is_rigid:
-        return _known(exposures, read, said, "the border")
     if prior.std_px == 0.0:
         shift = exposures.as_they_are.measured(follow=True)
-        return shift, Similarity(), f"{said}The camera is stated to stand still between the exposures."
-    shift, drift = aligned(exposures, in_room)
-    moved, expected = (
-        motion.displacement_px(shift.centres_px, exposures.before.shape) for motion in (drift, prior.mean)
+        return shift, STILL, "The camera is stated to stand still between the exposures."
+    still = trusted(exposures, marks, prior) if marks else Trusted((), None, ())
+    said = "".join(f"{why} " for why in still.refused)
+    if still.read is not None:
+        return _known(exposures, still.read, said, f"the {_listed(still.names)}")
+    read = read_motion(exposures, border, prior)
+    if read is not None and read.is_rigid:
+        return _known(exposures, read, said, "the border")
+    shift, drift_px = aligned(exposures, in_room, prior)
+    back_px = motion_basis(shift.centres_px, exposures.optics) @ (drift_px - prior.mean_px)
+    motion = CameraMotion(exposures.optics, prior.std_px * np.eye(MOTIONS))
+    shift = replace(shift, displacement_px=shift.displacement_px + back_px, motion=motion)
+    return shift, prior.mean_px, said + _unknown(_of_middle(drift_px, exposures.optics), prior, read)
+
+
+def _known(exposures: Exposures, read: Rigid, said: str, source: str) -> tuple[ShiftMeasurement, Motion, str]:
+    motion = CameraMotion(exposures.optics, max(1.0, read.unlike) ** 0.5 * read.root_px)
+    told = _moved(_of_middle(read.motion_px, exposures.optics), read.motion_px)
+    return (
+        replace(read.shift, motion=motion),
+        read.motion_px,
+        f"{said}Drift between the exposures, from {source}: {told}; removed.",
     )
-    motion = CameraMotion(exposures.size_px, prior.std_px * np.eye(4))
-    shift = replace(shift, displacement_px=shift.displacement_px + moved - expected, motion=motion)
-    return shift, prior.mean, said + _unknown(drift, prior, read.unlike if known else None)
-
-
-def _known(
-    exposures: Exposures, read: Rigid, said: str, source: str
-) -> tuple[ShiftMeasurement, Similarity, str]:
-    motion = CameraMotion(exposures.size_px, max(1.0, read.unlike) ** 0.5 * read.root_px)
-    return replace(read.shift, motion=motion), read.motion, said + _told(read.motion, source)
 
 
 def _listed(names: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def _told(drift: Similarity, source: str) -> str:
+def _of_middle(motion_px: Motion, optics: Optics) -> Float[np.ndarray, " 2"]:
+    """How far a motion of the camera moves the middle of its picture."""
+    middle = (np.array([[optics.width_px, optics.height_px]]) - 1.0) / 2.0
+    return motion_basis(middle, optics)[0] @ motion_px
+
+
+def _moved(middle_px: Float[np.ndarray, " 2"], motion_px: Motion) -> str:
+    across, down = middle_px
+    _, _, magnified, rolled, _, _ = motion_px
     return (
-        f"Drift between the exposures, from {source}: {drift.column_px:+.4f} px across, "
-        f"{drift.row_px:+.4f} px down, {1e6 * drift.rotation_rad:+.1f} urad; removed."
+        f"{across:+.4f} px across and {down:+.4f} px down in the middle of the picture, rolled by {rolled:+.4f} px "
+        f"and magnified by {magnified:+.4f} px at its edge"
     )
 
 
-def _unknown(drift: Similarity, prior: MotionPrior, unlike: float | None) -> str:
+def _unknown(middle_px: Float[np.ndarray, " 2"], prior: MotionPrior, border: Rigid | None) -> str:
     why = "No part of the picture is free of the room's air."
-    if unlike is not None:
+    if border is not None:
         why = (
             "The border of the picture is not still: what a rigid motion leaves of it is "
-            f"{unlike**0.5:.1f} times its noise, so the room's air is before it."
+            f"{border.unlike**0.5:.1f} times its noise, so the room's air is before it."
         )
     return (
-        f"{why} The whole picture moved by {drift.column_px:+.3f} px across, {drift.row_px:+.3f} px down. How much "
-        f"of that is the camera is not known exactly ({prior.source}), and is estimated together with the air."
+        f"{why} The middle of the picture moved by {middle_px[0]:+.3f} px across, {middle_px[1]:+.3f} px down. How "
+        f"much of that is the camera is not known exactly ({prior.source}), and is estimated together with the air."
     )

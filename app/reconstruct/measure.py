@@ -21,7 +21,7 @@ from app.reconstruct.yardstick import Exposures, Yardstick
 from core.camera_noise import frame_variance, scattered_variance
 from core.defects import without_defects
 from core.displacement import resolve_window_px, window_centres
-from core.drift import Similarity, move_image
+from core.drift import Motion, move_image
 from core.problem import ImagePair, ShiftMeasurement
 from core.rays.visibility import hidden_by_objects, sees_wall, within_marks
 from core.scene import Scene, View
@@ -45,7 +45,7 @@ class Measurement:
 
     captures: CapturePair
     shifts: tuple[ShiftMeasurement, ...]
-    drifts: tuple[Similarity, ...]
+    drifts_px: tuple[Motion, ...]
     notes: tuple[str, ...]
     scene: Scene
     images: tuple[ImagePair, ...] = ()
@@ -64,32 +64,39 @@ def measure(
     reference, flow = captures.reference, captures.flow
     _check_captures(reference, flow, scene)
     standing = standing or what_stands(scene, [image.mean for image in reference.images])
-    shifts, drifts, notes, views = [], [], [], []
+    shifts, drifts_px, notes, views = [], [], [], []
     for index, view in enumerate(scene.views):
-        shift, drift, note = _measure_view(scene, index, view, captures, standing.covered[index])
+        shift, drift_px, note = _measure_view(scene, index, view, captures, standing.covered[index])
         alone = _alone(scene, index, _picture(flow, index), shift.window_px)
         shift, bursts, left_out = burst_shifts(scene, index, captures, shift, alone, watch)
         shift, averaged = with_short_mean(shift, bursts, captures)
         views.append(bursts)
         shifts.append(shift)
-        drifts.append(drift)
+        drifts_px.append(drift_px)
         notes.append(note + left_out + averaged)
     images: tuple[ImagePair, ...] = ()
     if scene.solve.data_term == "warped":
-        images = tuple(_pair(view, n, captures, drifts[n]) for n, view in enumerate(scene.views))
+        images = tuple(_pair(view, n, captures, drifts_px[n]) for n, view in enumerate(scene.views))
     if standing.things:
         shifts = past_objects(standing.scene, shifts)
         views = [_in_windows(*of) for of in zip(views, shifts, strict=True)]
     bursts = tuple(zip(*views, strict=True))
     return Measurement(
-        captures, tuple(shifts), tuple(drifts), tuple(notes), standing.scene, images, bursts, standing.things
+        captures,
+        tuple(shifts),
+        tuple(drifts_px),
+        tuple(notes),
+        standing.scene,
+        images,
+        bursts,
+        standing.things,
     )
 
 
-def _pair(view: View, index: int, captures: CapturePair, drift: Similarity) -> ImagePair:
+def _pair(view: View, index: int, captures: CapturePair, drift_px: Motion) -> ImagePair:
     before, after = (_picture(capture, index) for capture in (captures.reference, captures.flow))
     variance = _variance(captures.reference, index, view) + _variance(captures.flow, index, view)
-    return ImagePair(move_image(before, drift), after, float(variance.mean()))
+    return ImagePair(move_image(before, drift_px, view.camera), after, float(variance.mean()))
 
 
 def _picture(capture: Capture, index: int) -> Image:
@@ -110,7 +117,7 @@ def _variance(capture: Capture, index: int, view: View) -> np.ndarray:
 
 def _measure_view(
     scene: Scene, index: int, view: View, captures: CapturePair, covered: np.ndarray
-) -> tuple[ShiftMeasurement, Similarity, str]:
+) -> tuple[ShiftMeasurement, Motion, str]:
     exposures = _exposures(scene, index, captures.reference, captures.flow)
     check_pair(captures.reference, captures.flow, index, exposures.variance)
     shape, window_px = exposures.before.shape, exposures.window_px
@@ -119,10 +126,10 @@ def _measure_view(
     if captures.after is not None:
         found = between_references(captures, scene, index)
         prior, said = found.at(_share(captures.reference, captures.flow, captures.after)), f"{found.said} "
-    shift, drift, note = without_known_drift(
+    shift, drift_px, note = without_known_drift(
         exposures, in_room, beyond, prior, _marks(view, shape, window_px)
     )
-    return _in_room(shift, in_room, covered, shape, drift, said + note)
+    return _in_room(shift, in_room, covered, shape, drift_px, said + note)
 
 
 def _wall_and_beyond(scene: Scene, index: int, shape: tuple[int, int], window_px: int) -> tuple[Mask, Mask]:
@@ -159,7 +166,7 @@ def _alone(scene: Scene, index: int, mean: Image, window_px: int) -> Callable[[C
 
     def measured(burst: Capture) -> ShiftMeasurement:
         variance = uniform_filter(_variance(burst, index, view), 2 * window_px)
-        exposures = Exposures(mean, _picture(burst, index), variance, window_px)
+        exposures = Exposures(mean, _picture(burst, index), variance, window_px, view.camera)
         return without_known_drift(exposures, in_room, beyond, mount(view.drift_std_px), marks)[0]
 
     return measured
@@ -190,7 +197,7 @@ def _exposures(scene: Scene, index: int, first: Capture, second: Capture) -> Exp
     # One weight a window: pixel by pixel the darkest would weigh a thousandfold, and with them what the
     # model leaves out there (clipping, aliasing), which biases a drift of 0.1 px by 1 %.
     before, after = (_picture(capture, index) for capture in (first, second))
-    return Exposures(before, after, uniform_filter(variance, 2 * window_px), window_px)
+    return Exposures(before, after, uniform_filter(variance, 2 * window_px), window_px, view.camera)
 
 
 def _share(*captures: Capture) -> float:
@@ -204,9 +211,9 @@ def _in_room(
     in_room: np.ndarray,
     covered: np.ndarray,
     shape: tuple[int, int],
-    drift: Similarity,
+    drift_px: Motion,
     note: str,
-) -> tuple[ShiftMeasurement, Similarity, str]:
+) -> tuple[ShiftMeasurement, Motion, str]:
     """The good windows that see the room's wall; what was refused is told."""
     hidden = covered[in_room]
     if hidden.any():
@@ -221,7 +228,7 @@ def _in_room(
             f" {100 * refused:.1f} % of the windows show something else than the pattern, moved, in one of the "
             "pictures (a person, a reflection, another light), and are left out."
         )
-    return shift.good(), drift, note
+    return shift.good(), drift_px, note
 
 
 def _whole(centres_px: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -12,7 +12,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 
 from core.displacement import ShiftOfPair
-from core.drift import Similarity, fit_similarity, move_image
+from core.drift import STILL, Motion, fit_motion, move_image
+from core.geometry import Optics
+from core.motion import MOTIONS, motion_basis
 from core.problem import ShiftMeasurement
 
 Mask = Bool[np.ndarray, " windows"]
@@ -31,26 +33,24 @@ _SEEN_PER_PX2 = 1.0
 
 @dataclass(frozen=True)
 class Exposures:
-    """The two pictures of a view, the variance of their difference, and the windows' width."""
+    """The two pictures of a view, the variance of their difference, the windows' width, and the camera's lens."""
 
     before: Float32[np.ndarray, "rows cols"]
     after: Float32[np.ndarray, "rows cols"]
     variance: Float32[np.ndarray, "rows cols"]
     window_px: int
-
-    @property
-    def size_px(self) -> tuple[int, int]:
-        """Width and height."""
-        return self.before.shape[1], self.before.shape[0]
+    optics: Optics
 
     @cached_property
     def as_they_are(self) -> ShiftOfPair:
         """Both pictures, before any motion is taken out."""
         return ShiftOfPair(self.before, self.after, self.variance, self.window_px)
 
-    def moved(self, drift: Similarity) -> ShiftOfPair:
+    def moved(self, drift_px: Motion) -> ShiftOfPair:
         """Both pictures, with the first as it looks after a motion of the camera."""
-        return ShiftOfPair(move_image(self.before, drift), self.after, self.variance, self.window_px)
+        return ShiftOfPair(
+            move_image(self.before, drift_px, self.optics), self.after, self.variance, self.window_px
+        )
 
 
 @dataclass(frozen=True)
@@ -62,17 +62,29 @@ class Yardstick:
 
 
 @dataclass(frozen=True)
-class Rigid:
-    """The motion of the camera that some windows tell, its deviation, and what it leaves of them.
+class MotionPrior:
+    """What is known of the camera's six motions before a pair of pictures is looked at: mean, and one deviation [px].
 
-    `shift` is that of all windows without the motion. The columns of `root_px` are motions of one standard deviation
-    in px at the picture's edge, infinite where nothing is known; `unlike` is the mean square, over its noise, of what
-    the motion leaves.
+    `source` says where it comes from.
+    """
+
+    mean_px: Motion
+    std_px: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """The motion of the camera that some windows and its prior tell, and what it leaves of the windows.
+
+    `shift` is that of all windows without the motion. The columns of `root_px` are what stays unknown of it, in
+    motions of one standard deviation; `unlike` is the mean square, over its noise, of what the motion leaves of the
+    windows that were asked.
     """
 
     shift: ShiftMeasurement
-    motion: Similarity
-    root_px: Float[np.ndarray, "4 4"]
+    motion_px: Motion
+    root_px: Float[np.ndarray, "6 6"]
     unlike: float
     windows: int
 
@@ -81,38 +93,50 @@ class Rigid:
         """Whether what the motion leaves is noise."""
         return is_noise(self.unlike, self.windows)
 
-    @property
-    def std_px(self) -> float:
-        """The largest motion of one standard deviation."""
-        return float(np.linalg.norm(self.root_px, axis=0).max())
 
-
-def read_motion(exposures: Exposures, windows: Mask) -> Rigid:
-    """The motion of the camera as these windows tell it, if they are still."""
-    shape, first = exposures.before.shape, exposures.as_they_are.measured(follow=False)
+def read_motion(exposures: Exposures, windows: Mask, prior: MotionPrior) -> Rigid | None:
+    """The motion of the camera as these windows tell it, if they are still; None where too few show something."""
+    first = exposures.as_they_are.measured(follow=False)
     if good_windows(first, windows).sum() < _LEAST_IN_PART:
-        return Rigid(first, Similarity(), np.full((4, 4), np.inf), 0.0, 0)
-    shift, drift = aligned(exposures, windows)
+        return None
+    shift, drift_px = aligned(exposures, windows, prior)
+    return _fitted(shift, windows, exposures.optics, prior, drift_px)
+
+
+def _fitted(
+    shift: ShiftMeasurement, windows: Mask, optics: Optics, prior: MotionPrior, taken_px: Motion
+) -> Rigid:
+    """What some windows tell of the rest of a motion, when so much of it is taken out of the shifts."""
     good = good_windows(shift, windows)
-    rest, covariance = fit_similarity(shift, good, shape)
-    left_px = shift.displacement_px - rest.displacement_px(shift.centres_px, shape)
-    unlike, root_px = _mean_square(shift, left_px, good), _root_px(covariance, exposures.size_px)
-    return Rigid(replace(shift, displacement_px=left_px), rest.after(drift), root_px, unlike, int(good.sum()))
+    rest_px, covariance = fit_motion(shift, good, optics, prior.mean_px - taken_px, prior.std_px)
+    left_px = shift.displacement_px - motion_basis(shift.centres_px, optics) @ rest_px
+    squares = np.einsum("wa,wab,wb->w", left_px, shift.information_per_px2, left_px)[good]
+    fitted = MOTIONS - np.trace(covariance) / prior.std_px**2
+    values, vectors = np.linalg.eigh(covariance)
+    return Rigid(
+        replace(shift, displacement_px=left_px),
+        taken_px + rest_px,
+        vectors * np.sqrt(np.maximum(values, 0.0)),
+        float(squares.sum() / max(2 * good.sum() - fitted, 1.0)),
+        int(good.sum()),
+    )
 
 
-def trusted(exposures: Exposures, parts: Sequence[Yardstick]) -> "Trusted":
+def trusted(exposures: Exposures, parts: Sequence[Yardstick], prior: MotionPrior) -> "Trusted":
     """The parts that move like one rigid picture, what they tell, and why each of the others is refused."""
     kept, refused = [], []
-    shift = aligned(exposures, _together(parts))[0]
+    shift, drift_px = aligned(exposures, _together(parts), prior)
     for part in parts:
-        why = _why_not(shift, part, exposures.before.shape)
+        why = _why_not(part, good_windows(shift, part.windows)) or _not_still(
+            _fitted(shift, part.windows, exposures.optics, prior, drift_px)
+        )
         kept += [part] if why is None else []
         refused += [] if why is None else [f"The {part.name} cannot tell the camera's motion: {why}."]
     while kept:
-        whole = read_motion(exposures, _together(kept))
-        if whole.is_rigid or len(kept) == 1:
+        whole = read_motion(exposures, _together(kept), prior)
+        if whole is None or whole.is_rigid or len(kept) == 1:
             return Trusted(tuple(one.name for one in kept), whole, tuple(refused))
-        odd = _odd_ones(exposures, kept)
+        odd = _odd_ones(exposures, kept, prior)
         refused.append(_unlike_others([one.name for one in odd], whole.unlike))
         kept = [one for one in kept if one not in odd]
     return Trusted((), None, tuple(refused))
@@ -127,17 +151,18 @@ class Trusted:
     refused: tuple[str, ...]
 
 
-def aligned(exposures: Exposures, yardstick: Mask) -> tuple[ShiftMeasurement, Similarity]:
+def aligned(exposures: Exposures, yardstick: Mask, prior: MotionPrior) -> tuple[ShiftMeasurement, Motion]:
     """The shifts that are left when the reference is moved as the yardstick moved, and that motion."""
-    pictures, drift, shape = exposures.as_they_are, Similarity(), exposures.before.shape
+    pictures, drift_px = exposures.as_they_are, STILL
     for _ in range(_PASSES if yardstick.sum() >= _LEAST_WINDOWS else 0):
         shift = pictures.measured(follow=False)
-        rest, _ = fit_similarity(shift, good_windows(shift, yardstick), shape)
-        if max(abs(rest.column_px), abs(rest.row_px)) < _SMALL_DRIFT_PX:
+        good = good_windows(shift, yardstick)
+        rest_px, _ = fit_motion(shift, good, exposures.optics, prior.mean_px - drift_px, prior.std_px)
+        if np.abs(motion_basis(shift.centres_px, exposures.optics) @ rest_px).max() < _SMALL_DRIFT_PX:
             break
-        drift = rest.after(drift)
-        pictures = exposures.moved(drift)
-    return pictures.measured(follow=True), drift
+        drift_px = drift_px + rest_px
+        pictures = exposures.moved(drift_px)
+    return pictures.measured(follow=True), drift_px
 
 
 def good_windows(shift: ShiftMeasurement, chosen: Mask) -> Mask:
@@ -155,30 +180,28 @@ def _together(parts: Sequence[Yardstick]) -> Mask:
     return np.any([part.windows for part in parts], axis=0)
 
 
-def _why_not(shift: ShiftMeasurement, part: Yardstick, shape: tuple[int, int]) -> str | None:
-    """Why a part alone is no yardstick; None where nothing speaks against it."""
-    good = good_windows(shift, part.windows)
-    if part.windows.sum() < _LEAST_IN_PART:
-        return (
-            f"{int(part.windows.sum())} windows lie in it; expected {_LEAST_IN_PART} at least. Draw it larger"
-        )
+def _why_not(part: Yardstick, good: Mask) -> str | None:
+    """Why a part's windows tell nothing; None where enough of them are good."""
+    windows = int(part.windows.sum())
+    if windows < _LEAST_IN_PART:
+        return f"{windows} windows lie in it; expected {_LEAST_IN_PART} at least. Draw it larger"
     if good.sum() < _LEAST_IN_PART:
-        return (
-            f"{int(good.sum())} of its {int(part.windows.sum())} windows show something that can be followed"
-        )
-    rest, _ = fit_similarity(shift, good, shape)
-    unlike = _mean_square(shift, shift.displacement_px - rest.displacement_px(shift.centres_px, shape), good)
-    if not is_noise(unlike, int(good.sum())):
-        return f"what a rigid motion leaves of it is {unlike**0.5:.1f} times its noise, so it is not still"
+        return f"{int(good.sum())} of its {windows} windows show something that can be followed"
     return None
 
 
-def _odd_ones(exposures: Exposures, parts: list[Yardstick]) -> list[Yardstick]:
+def _not_still(read: Rigid) -> str | None:
+    if read.is_rigid:
+        return None
+    return f"what a rigid motion leaves of it is {read.unlike**0.5:.1f} times its noise, so it is not still"
+
+
+def _odd_ones(exposures: Exposures, parts: list[Yardstick], prior: MotionPrior) -> list[Yardstick]:
     """The part without which the others agree best; of two, both, for nobody knows which one moved."""
     if len(parts) == 2:
         return parts
-    left = [[one for one in parts if one is not part] for part in parts]
-    unlike = [read_motion(exposures, _together(others)).unlike for others in left]
+    left = [read_motion(exposures, _together([o for o in parts if o is not part]), prior) for part in parts]
+    unlike = [np.inf if read is None else read.unlike for read in left]
     return [parts[int(np.argmin(unlike))]]
 
 
@@ -188,18 +211,3 @@ def _unlike_others(names: list[str], unlike: float) -> str:
         f"The {' and '.join(names)} {how}: what one rigid motion leaves is {unlike**0.5:.1f} times the noise. "
         f"The room's air is before {which}, or somebody touched {which}."
     )
-
-
-def _mean_square(shift: ShiftMeasurement, left_px: Float[np.ndarray, "windows 2"], chosen: Mask) -> float:
-    """Mean square over the noise of what a fitted motion leaves of some windows."""
-    squares = np.einsum("wa,wab,wb->w", left_px, shift.information_per_px2, left_px)[chosen]
-    return float(squares.sum() / max(2 * chosen.sum() - 4, 1))
-
-
-def _root_px(covariance: Float[np.ndarray, "4 4"], size_px: tuple[int, int]) -> Float[np.ndarray, "4 4"]:
-    """Motions of one standard deviation, in px at the picture's edge; without bound where nothing is known."""
-    to_edge = np.array([1.0, 1.0, max(size_px) / 2, max(size_px) / 2])
-    values, vectors = np.linalg.eigh(covariance * np.outer(to_edge, to_edge))
-    if values[0] <= 1e-12 * values[-1]:
-        return np.full((4, 4), np.inf)
-    return vectors * np.sqrt(values)

@@ -11,12 +11,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import xarray as xr
-from jaxtyping import Float32
+from jaxtyping import Float, Float32
 
 from app.files.durable import durable_path
 from core.displacement import check_pair
-from core.drift import Similarity, fit_similarity
-from core.problem import ShiftMeasurement
 
 Image = Float32[np.ndarray, "rows cols"]
 
@@ -26,11 +24,11 @@ _LEAST_TEXTURE = 1e-9
 
 @dataclass(frozen=True)
 class ShiftField:
-    """Displacement (column, row) of every pixel from reference to flow, and one sigma of each."""
+    """Displacement (column, row) of every pixel from reference to flow, one sigma of each, and the middle's drift."""
 
     displacement_px: Float32[np.ndarray, "rows cols 2"]
     std_px: Float32[np.ndarray, "rows cols 2"]
-    drift: Similarity | None
+    drift_px: Float[np.ndarray, " 2"] | None
 
 
 def shift_field(reference: Image, flow: Image, window_px: int = 21, remove_drift: bool = False) -> ShiftField:
@@ -42,11 +40,11 @@ def shift_field(reference: Image, flow: Image, window_px: int = 21, remove_drift
     start = np.zeros((*a.shape, 2), np.float32)
     field = cv2.calcOpticalFlowFarneback(a, b, start, 0.5, 3, window_px, 5, 7, 1.5, 0)
     std = _standard_deviation(a, b, field, window_px)
-    drift = None
+    drift_px = None
     if remove_drift:
-        drift, motion = _border_drift(field, std)
-        field = field - motion
-    return ShiftField(field.astype(np.float32), std, drift)
+        drift_px, everywhere = _border_drift(field, std)
+        field = field - everywhere
+    return ShiftField(field.astype(np.float32), std, drift_px)
 
 
 def write_shift_field(path: Path, field: ShiftField, title: str) -> None:
@@ -91,8 +89,8 @@ def _standard_deviation(a: Image, b: Image, field: np.ndarray, window_px: int) -
     return np.sqrt(variance).astype(np.float32)
 
 
-def _border_drift(field: np.ndarray, std: np.ndarray) -> tuple[Similarity, np.ndarray]:
-    """Similarity of the border, and its displacement everywhere. Medians of blocks: a plume may cross it."""
+def _border_drift(field: np.ndarray, std: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How the border's similarity moves the middle, and every pixel. Medians of blocks: a plume may cross it."""
     shape = field.shape[:2]
     step = max(4, min(shape) // 64)
     rows, cols = np.mgrid[step // 2 : shape[0] : step, step // 2 : shape[1] : step]
@@ -103,9 +101,17 @@ def _border_drift(field: np.ndarray, std: np.ndarray) -> tuple[Similarity, np.nd
     middle = np.median(values[border], axis=0)
     spread = 1.4826 * np.median(np.abs(values[border] - middle), axis=0) + 1e-3
     border &= np.all(np.abs(values - middle) < 4 * spread, axis=1)
-    information = np.einsum("wa,ab->wab", 1.0 / std[rows.ravel(), cols.ravel()].astype(float) ** 2, np.eye(2))
-    measurement = ShiftMeasurement(centres, values, information, step)
-    drift, _ = fit_similarity(measurement, border, shape)
+    weight = 1.0 / std[rows.ravel(), cols.ravel()][border].astype(float)
+    to_border = _similarities(centres[border], shape) * weight[..., None]
+    drift = np.linalg.lstsq(to_border.reshape(-1, 4), (values[border] * weight).ravel(), rcond=None)[0]
     every_row, every_col = np.indices(shape)
     points = np.stack([every_col.ravel(), every_row.ravel()], -1).astype(float)
-    return drift, drift.displacement_px(points, shape).reshape(*shape, 2)
+    return drift[:2], (_similarities(points, shape) @ drift).reshape(*shape, 2)
+
+
+def _similarities(points_px: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """What a unit of shift across, down, rotation and magnification does to points, about the picture's middle."""
+    half = max(shape) / 2
+    x, y = ((points_px - (np.array(shape[::-1]) - 1) / 2) / half).T
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    return np.stack([np.stack([one, zero, -y, x], -1), np.stack([zero, one, x, y], -1)], axis=-2)

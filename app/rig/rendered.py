@@ -19,6 +19,7 @@ from app.volume.scene import room_box, room_objects
 from app.volume.snapshots import read_snapshots
 from core.fields import GridField
 from core.geometry import Box, rotation_matrix, rotation_vector
+from core.lens import on_plane, seen_at
 from core.rays.visibility import first_hit, wall_points
 from core.render import render_flow, render_reference
 from core.scene import ProjectedPattern, Scene
@@ -87,11 +88,11 @@ def _mounted(experiment: Experiment, settings: SimulatedCameraSettings, view: in
 def _before_the_mount_crept(experiment: Experiment, scene: Scene, view: int) -> Back:
     """Where the pixels of this view were before its camera turned, and its lens breathed."""
     before, now = experiment.settings.scene.views[view].camera, scene.views[view].camera
-    turned = (before.rotation @ now.rotation.T)[:2, :2]
-    grown = np.array(now.focal_px) / np.array(before.focal_px)
 
     def back(points_px: Float[np.ndarray, "... 2"]) -> Float[np.ndarray, "... 2"]:
-        return np.array(before.principal_px) + (points_px - np.array(now.principal_px)) / grown @ turned.T
+        plane = on_plane(now, points_px.reshape(-1, 2))
+        ray = np.column_stack([plane, np.ones(len(plane))]) @ (before.rotation @ now.rotation.T).T
+        return seen_at(before, ray[:, :2] / ray[:, 2:]).reshape(points_px.shape)
 
     return back
 
@@ -171,23 +172,22 @@ def temperature_field(temperature_k: Float32[np.ndarray, "nx ny nz"], scene: Sce
 def drifted(scene: Scene, view: int, drift_px: float, breathing_px: float, seed: int) -> Scene:
     """The scene with one camera moved between exposures.
 
-    A shift of `drift_px`, a roll as large at the picture's edge, and a magnification of `breathing_px` there.
+    It turns by `drift_px` on its optical axis, in any direction, and rolls by as much at the picture's edge; its lens
+    magnifies by `breathing_px` there.
     """
     if drift_px == breathing_px == 0.0:
         return scene
     rng = np.random.default_rng([seed, 77])
     camera = scene.views[view].camera
     angle = rng.uniform(0, 2 * np.pi)
-    roll = rng.choice([-1.0, 1.0]) * drift_px / camera.width_px
+    roll_rad = rng.choice([-1.0, 1.0]) * drift_px / camera.width_px
     grown = 1.0 + rng.choice([-1.0, 1.0]) * 2.0 * breathing_px / camera.width_px
-    column_px, row_px = drift_px * np.cos(angle), drift_px * np.sin(angle)
-    (cx, cy), (fx, fy) = camera.principal_px, camera.focal_px
-    rotation = rotation_matrix((0.0, 0.0, float(roll))) @ camera.rotation
+    fx, fy = camera.focal_px
+    turn_rad = (float(-drift_px * np.sin(angle) / fy), float(drift_px * np.cos(angle) / fx), float(roll_rad))
     moved = replace(
         camera,
-        principal_px=(float(cx + column_px), float(cy + row_px)),
         focal_px=(float(grown * fx), float(grown * fy)),
-        rotation_rad=rotation_vector(rotation),
+        rotation_rad=rotation_vector(rotation_matrix(turn_rad) @ camera.rotation),
     )
     views = tuple(replace(v, camera=moved) if n == view else v for n, v in enumerate(scene.views))
     return replace(scene, views=views)

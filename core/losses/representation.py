@@ -44,13 +44,13 @@ class Representation(Protocol):
 class Unknowns(eqx.Module):
     """All unknowns of a solve: a representation, and what the scene leaves open besides.
 
-    `drift`: a motion of each view's picture (camera and projector together; they are the same four numbers to first
+    `drift`: a motion of each view's picture (camera and projector together; they are the same six numbers to first
     order when the wall is seen face-on), in the units of the losses' `motions`.
     None where the camera cannot have moved.
     """
 
     representation: Representation
-    drift: Float[Array, "views 4"] | None = None
+    drift: Float[Array, "views 6"] | None = None
 
 
 def positions(span: Span) -> Float[np.ndarray, " n"]:

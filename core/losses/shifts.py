@@ -35,11 +35,11 @@ class ShiftRows(eqx.Module):
     operator: StraightRayOperator
     matrix: Float[Array, "positions k 2"]
     target: Float[Array, "rows k"]
-    motions: Float[Array, "positions 2 4"]
+    motions: Float[Array, "positions 2 6"]
     samples: int = eqx.field(static=True, default=1)
 
     def errors(
-        self, excess: Float[Array, "nx ny nz"], drift: Float[Array, "4"] | None
+        self, excess: Float[Array, "nx ny nz"], drift: Float[Array, "6"] | None
     ) -> Float[Array, "rows k"]:
         """Model minus measurement, over the noise."""
         shift = self.operator.apply(excess)
@@ -97,7 +97,7 @@ class ShiftLoss(eqx.Module):
 def displacement_rows(
     shift: ShiftMeasurement,
     operator: StraightRayOperator,
-    motions: Float[np.ndarray, "windows 2 4"],
+    motions: Float[np.ndarray, "windows 2 6"],
     model_std_px: float,
 ) -> ShiftRows:
     """Rows of windows: W^(1/2) (d − d_measured), W the inverse of noise plus model covariance.

@@ -75,7 +75,7 @@ class RenderedRows(eqx.Module):
         return self.flow.shape[0]
 
     def errors(
-        self, chosen: Array, air: RepresentedAir, tracer: QuasiLinearTracer, drift: Float[Array, "4"] | None
+        self, chosen: Array, air: RepresentedAir, tracer: QuasiLinearTracer, drift: Float[Array, "6"] | None
     ) -> Float[Array, " some"]:
         """Of some pixels, over the noise."""
         geometry = _chosen(self.geometry, chosen, self.samples)
@@ -91,7 +91,7 @@ class TracedWindows(eqx.Module):
     seen_from_wall: Float[Array, "windows 2 3"]
     root: Float[Array, "windows 2 2"]
     target: Float[Array, "windows 2"]
-    motions: Float[Array, "windows 2 4"]
+    motions: Float[Array, "windows 2 6"]
 
     @property
     def count(self) -> int:
@@ -99,7 +99,7 @@ class TracedWindows(eqx.Module):
         return self.target.shape[0]
 
     def errors(
-        self, chosen: Array, air: RepresentedAir, tracer: QuasiLinearTracer, drift: Float[Array, "4"] | None
+        self, chosen: Array, air: RepresentedAir, tracer: QuasiLinearTracer, drift: Float[Array, "6"] | None
     ) -> Float[Array, "some 2"]:
         """Of some windows, over the noise."""
         offset_m = wall_offset_m(_chosen(self.geometry, chosen, 1), air, tracer)
@@ -165,7 +165,7 @@ def traced_windows(
     view: int,
     shift: ShiftMeasurement,
     model_std_px: float,
-    motions: Float[np.ndarray, "windows 2 4"],
+    motions: Float[np.ndarray, "windows 2 6"],
 ) -> TracedWindows:
     """Windows with the inverse of noise plus model covariance as weight; `motions` as in `displacement_rows`."""
     geometry = pixel_geometry(scene, view, shift.centres_px)

@@ -13,7 +13,7 @@ from core.losses.image_rows import pixel_centres, rendered_rows, warped_rows
 from core.losses.physics import Loss, PhysicsLoss, PriorLoss, SmoothnessLoss
 from core.losses.shifts import ShiftLoss, ShiftRows, displacement_rows
 from core.losses.traced import TracedLoss, rendered_view, traced_windows
-from core.motion import CameraMotion
+from core.motion import MOTIONS, CameraMotion
 from core.problem import ImagePair, Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.rays.visibility import away_from_walls
@@ -169,18 +169,17 @@ def _unit(shift: ShiftMeasurement) -> float:
 
 def _motion_of(problem: Problem, view: int) -> CameraMotion:
     """What a unit of the view's unknown motion is; nothing where the camera stood still."""
-    camera = problem.scene.views[view].camera
-    root_px = np.zeros((4, 4))
+    root_px = np.zeros((MOTIONS, MOTIONS))
     if view < len(problem.shifts):
         shift = nearly_still(problem.shifts[view])
         if shift.motion is not None:
             root_px = _unit(shift) * shift.motion.root_px
-    return CameraMotion((camera.width_px, camera.height_px), root_px)
+    return CameraMotion(problem.scene.views[view].camera, root_px)
 
 
 def _kept_windows(
     problem: Problem, view: int, data: DataModel
-) -> tuple[ShiftMeasurement, float, Float[np.ndarray, "windows 2 4"]]:
+) -> tuple[ShiftMeasurement, float, Float[np.ndarray, "windows 2 6"]]:
     """Windows that the grid can represent, the representation error in px, and what units of motion do to them."""
     shift = nearly_still(problem.shifts[view])
     used, model_std_px = _usable(shift, data)

@@ -1,11 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import ndimage
 
 from core.displacement import measure_shift, standard_deviation_px, window_centres
-from core.drift import Similarity, fit_similarity, move_image
+from core.drift import STILL, fit_motion, move_image
+from core.geometry import looking_along_y
+from core.motion import motion_basis
 from core.setting import SettingError
 from core.window_fit import derivative_filter
+
+LENS = looking_along_y(position_m=(0.0, 0.0, 0.0), width_px=256, height_px=256, focal_px=1e4)
 
 
 def band_limited(shape, seed, shift=(0.0, 0.0), shortest_px=3.0):
@@ -64,26 +70,44 @@ def test_a_lamp_that_changes_by_two_percent_does_not_move_the_pattern():
 
 def test_drift_is_found_on_the_border_and_taken_out():
     reference = band_limited((256, 256), 5, shortest_px=4.0)
-    drift = Similarity(column_px=0.2, row_px=-0.13, rotation_rad=1e-4, dilation=-5e-5)
-    moved = move_image(reference, drift)
+    drift_px = np.array([0.2, -0.13, -6e-3, 0.0128, 0.1, 0.05])
+    moved = move_image(reference, drift_px, LENS)
     first = measure_shift(reference, moved, 1e-6, 16)
     border = np.any((first.centres_px < 48) | (first.centres_px > 208), axis=1)
 
-    found, _ = fit_similarity(first, border, reference.shape)
-    second = measure_shift(move_image(reference, found), moved, 1e-6, 16)
-    rest, _ = fit_similarity(second, border, reference.shape)
+    found_px, _ = fit_motion(first, border, LENS, STILL, 1.0)
+    second = measure_shift(move_image(reference, found_px, LENS), moved, 1e-6, 16)
+    rest_px, _ = fit_motion(second, border, LENS, -found_px, 1.0)
 
-    total = rest.after(found)
-    assert total.column_px == pytest.approx(0.2, abs=1e-3)
-    assert total.row_px == pytest.approx(-0.13, abs=1e-3)
-    assert total.rotation_rad == pytest.approx(1e-4, abs=1e-5)
+    # Of a lens so long nobody can tell a turn from a sensor that is carried; what both do is known.
+    basis = motion_basis(first.centres_px, LENS)
+    np.testing.assert_allclose(basis @ (found_px + rest_px), basis @ drift_px, atol=1e-3)
+
+
+def test_what_is_known_before_decides_where_nothing_is_seen():
+    blind = measure_shift(*2 * (np.full((64, 64), 0.5, np.float32),), 1e-6, 32)
+    expected_px = np.array([0.3, 0.0, 0.0, -0.1, 0.0, 0.2])
+    found_px, covariance = fit_motion(blind, np.ones(len(blind.centres_px), bool), LENS, expected_px, 0.5)
+    np.testing.assert_allclose(found_px, expected_px, atol=1e-4)
+    np.testing.assert_allclose(covariance, 0.25 * np.eye(6), atol=1e-3)
 
 
 def test_moving_an_image_moves_it_the_stated_way():
     image = np.zeros((9, 9), np.float32)
     image[4, 4] = 1.0
-    moved = move_image(ndimage.gaussian_filter(image, 1.0), Similarity(column_px=2.0, row_px=-1.0))
+    by_px = np.array([2.0, -1.0, 0.0, 0.0, 0.0, 0.0])
+    moved = move_image(ndimage.gaussian_filter(image, 1.0), by_px, replace(LENS, width_px=9, height_px=9))
     assert np.unravel_index(moved.argmax(), moved.shape) == (3, 6)
+
+
+def test_a_picture_that_moves_and_moves_back_is_the_same():
+    wide = replace(LENS, focal_px=(180.0, 180.0), distortion=(-0.1, 0.02, 0.0, 0.0, 0.0))
+    picture = band_limited((256, 256), 7, shortest_px=8.0)
+    by_px = np.array([0.4, -0.3, 0.5, -0.8, 1.0, 0.7])
+    back = move_image(move_image(picture, by_px, wide), -by_px, wide)
+    # Second order in the motion: 1 px over 180 px.
+    inner = np.s_[12:-12, 12:-12]
+    assert np.abs(back - picture)[inner].max() < 0.02 * np.abs(picture - picture.mean()).max()
 
 
 def test_a_blank_window_says_that_it_knows_nothing():

@@ -19,6 +19,7 @@ from core.grid.multiresolution import MultiGrid, zero_multigrid
 from core.grid.staggered import StaggeredGrid
 from core.losses.physics import Loss, all_rows
 from core.losses.representation import Unknowns, positions
+from core.motion import MOTIONS
 from core.problem import Problem
 from core.result import Outcome, Solution
 from core.setting import SettingError, setting
@@ -119,7 +120,7 @@ def initial_unknowns(problem: Problem, frame: RoomFrame, settings: GridSettings)
     x, y, z = (positions(span) for span in spans)
     state = grid.of_fields((x, y, z), starting_flow(problem, frame, spans, settings.regime))
     levels = (*multigrid.levels[:-1], state)
-    drift = jnp.zeros((len(problem.shifts), 4)) if moved(problem) else None
+    drift = jnp.zeros((len(problem.shifts), MOTIONS)) if moved(problem) else None
     return Unknowns(MultiGrid(levels, multigrid.grids), drift)
 
 

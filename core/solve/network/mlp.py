@@ -20,6 +20,7 @@ from core.losses.representation import Unknowns
 from core.losses.shifts import ShiftLoss
 from core.losses.traced import TracedLoss
 from core.mlp import Mlp, MlpSettings, initial_mlp
+from core.motion import MOTIONS
 from core.problem import Problem
 from core.result import Outcome, Solution
 from core.setting import setting
@@ -124,7 +125,7 @@ def initial_unknowns(
 ) -> Unknowns:
     """A random network from the loop's seed, and zeros for what else the scene asks for."""
     network = initial_mlp(settings.network, lower, upper, jax.random.key(settings.loop.seed))
-    return Unknowns(network, jnp.zeros((len(problem.shifts), 4)) if moved(problem) else None)
+    return Unknowns(network, jnp.zeros((len(problem.shifts), MOTIONS)) if moved(problem) else None)
 
 
 def _lasting(settings: MlpSolveSettings) -> MlpSolveSettings:

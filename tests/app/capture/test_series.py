@@ -56,7 +56,7 @@ def test_a_flow_between_two_references_knows_the_mount_better(experiment):
     assert "two references" in measured.notes[0]
     assert between.motion is not None
     # At most half of the way between the references: in the middle of the time between them.
-    walked_px = float(np.sqrt(np.mean(moved.edge_px**2)))
+    walked_px = moved.typical_px
     assert 0.2 * walked_px < between.motion.root_px[0, 0] <= 0.5 * walked_px
     assert between.motion.root_px[0, 0] < DRIFT_PX
     left = np.linalg.norm(between.displacement_px.mean(0))

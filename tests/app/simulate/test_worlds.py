@@ -137,9 +137,11 @@ def test_marks_and_a_second_reference_are_asked_for_by_name(tmp_path):
     # The mount took a step before the flow, and another one after it.
     moved = between_references(captures, scene)
     assert moved.agree
-    steps = [drifted(scene, 0, LAB.drift_px, 0.0, seed).views[0].camera.principal_px for seed in (0, 1)]
-    walked = np.sum([np.subtract(step, scene.views[0].camera.principal_px) for step in steps], axis=0)
-    assert (moved.drift.column_px, moved.drift.row_px) == pytest.approx(tuple(walked), abs=0.02)
+    camera = scene.views[0].camera
+    turns = [drifted(scene, 0, LAB.drift_px, 0.0, seed).views[0].camera for seed in (0, 1)]
+    # Where each step carries what was seen in the middle.
+    walked = np.sum([camera.focal_px[0] * (turn.rotation @ camera.rotation[2])[:2] for turn in turns], axis=0)
+    assert tuple(moved.middle_px) == pytest.approx(tuple(walked), abs=0.02)
 
 
 def test_a_rehearsal_stands_in_a_lab_and_its_pictures_find_the_temperature(tmp_path):

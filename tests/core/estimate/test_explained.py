@@ -134,9 +134,8 @@ def test_a_room_is_doubted_for_what_is_more_than_noise_and_more_than_models_diff
 def after_a_step(given: Problem, std_px: float) -> Problem:
     """The same pictures, after the camera moved by as much as it may."""
     (shift,) = given.shifts
-    camera = given.scene.views[0].camera
-    motion = CameraMotion((camera.width_px, camera.height_px), std_px * np.eye(4))
-    step_px = motion.at(shift.centres_px) @ np.array([1.0, -0.6, 0.4, -0.9])
+    motion = CameraMotion(given.scene.views[0].camera, std_px * np.eye(6))
+    step_px = motion.at(shift.centres_px) @ np.array([1.0, -0.6, -0.9, 0.4, -0.8, 0.7])
     moved = replace(shift, displacement_px=shift.displacement_px + step_px, motion=motion)
     return replace(given, shifts=(moved,))
 
@@ -145,8 +144,8 @@ def after_a_step(given: Problem, std_px: float) -> Problem:
 def test_squares_without_what_windows_share_are_those_of_the_whole_covariance(std_px: float):
     data = observations(after_a_step(seen(4.0, 0.3), std_px), VERTICES)
     values, variance, kinds = data.values()
-    shared = np.zeros((len(values), 4))
-    shared[kinds == IMAGES] = data.shifts[0].shared_px.reshape(-1, 4)
+    shared = np.zeros((len(values), 6))
+    shared[kinds == IMAGES] = data.shifts[0].shared_px.reshape(-1, 6)
     total = np.diag(variance) + shared @ shared.T
 
     rest = data.unshared(values, variance)

@@ -125,8 +125,8 @@ def measured(where: Scene, truth: Solution, noise_px: float) -> Problem:
 def after_the_camera_moved(problem: Problem) -> Problem:
     """The same, after the mount moved the picture by far more than the air did."""
     (shift,) = problem.shifts
-    motion = CameraMotion((200, 200), 5.0 * np.eye(4))
-    step_px = motion.at(shift.centres_px) @ np.array([0.4, -1.0, 0.7, 0.2])
+    motion = CameraMotion(problem.scene.views[0].camera, 5.0 * np.eye(6))
+    step_px = motion.at(shift.centres_px) @ np.array([0.4, -1.0, 0.2, 0.7, -0.5, 0.8])
     moved = replace(shift, displacement_px=shift.displacement_px + step_px, motion=motion)
     return replace(problem, shifts=(moved,))
 

@@ -44,11 +44,11 @@ def drawn(noise_px, seed=0):
     centres = centres[sees_wall(SCENE, 0, centres, margin_px=float(WINDOW_PX))]
     rays = build(SCENE, 0, centres, modes.grid.shape, float(WINDOW_PX))
     slope = -SCENE.air.ambient_refractivity * SCENE.air.ambient_temperature_k / 295.0**2
-    motion = CameraMotion((600, 450), MOTION_PX * np.eye(4))
+    motion = CameraMotion(SCENE.views[0].camera, MOTION_PX * np.eye(6))
     bursts = []
     for one in weights.T:
         seen = np.asarray(rays.apply(jnp.asarray(slope * modes.sum(one, modes.grid.axes_m), jnp.float32)))
-        seen = seen + motion.at(centres) @ rng.standard_normal(4) + noise_px * rng.standard_normal(seen.shape)
+        seen = seen + motion.at(centres) @ rng.standard_normal(6) + noise_px * rng.standard_normal(seen.shape)
         information = np.tile(np.eye(2) / noise_px**2, (len(centres), 1, 1))
         bursts.append((ShiftMeasurement(centres, seen, information, WINDOW_PX, motion=motion),))
     axes_m = (mean.x_m, mean.y_m, mean.z_m)

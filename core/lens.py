@@ -1,10 +1,12 @@
-"""From pixels to directions through Brown-Conrady distortion, by Newton's method.
+"""Between pixels and directions through Brown-Conrady distortion, in NumPy; the way back by Newton's method.
 
 Our own, because OpenCV's interface to it differs between 4.x and 5 and its default stops at 5 iterations.
 """
 
 import numpy as np
 from jaxtyping import Float
+
+from core.geometry import Optics
 
 _STEPS = 8
 
@@ -28,3 +30,26 @@ def directions(
         determinant = a * d - b * b
         x, y = x - (d * ex - b * ey) / determinant, y - (a * ey - b * ex) / determinant
     return np.stack([x, y, np.ones_like(x)], axis=1)
+
+
+def on_plane(optics: Optics, pixels_px: Float[np.ndarray, "points 2"]) -> Float[np.ndarray, "points 2"]:
+    """Where the rays of pixels (column, row) meet the plane at distance 1 before the lens: to the right, down."""
+    (fx, fy), (cx, cy) = optics.focal_px, optics.principal_px
+    matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    return directions(matrix, np.array(optics.distortion), pixels_px)[:, :2]
+
+
+def seen_at(optics: Optics, plane: Float[np.ndarray, "points 2"]) -> Float[np.ndarray, "points 2"]:
+    """The pixels (column, row) of points of that plane: the inverse of `on_plane`."""
+    k1, k2, p1, p2, k3 = optics.distortion
+    x, y = plane.T
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    seen = np.stack(
+        [
+            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+        ],
+        axis=1,
+    )
+    return np.array(optics.principal_px) + np.array(optics.focal_px) * seen
