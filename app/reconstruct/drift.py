@@ -144,10 +144,7 @@ def _moved(middle_px: Float[np.ndarray, " 2"], motion_px: Motion) -> str:
 def _unknown(middle_px: Float[np.ndarray, " 2"], prior: MotionPrior, border: Rigid | None) -> str:
     why = "No part of the picture is free of the room's air."
     if border is not None:
-        why = (
-            "The border of the picture is not still: what a rigid motion leaves of it is "
-            f"{border.unlike**0.5:.1f} times its noise, so the room's air is before it."
-        )
+        why = f"The border of the picture is not still: {border.left}, so the room's air is before it."
     return (
         f"{why} The middle of the picture moved by {middle_px[0]:+.3f} px across, {middle_px[1]:+.3f} px down. How "
         f"much of that is the camera is not known exactly ({prior.source}), and is estimated together with the air."

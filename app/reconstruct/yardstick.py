@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
+from scipy import special
 
 from core.displacement import ShiftOfPair
 from core.drift import STILL, Motion, fit_motion, move_image
@@ -25,6 +26,8 @@ _PASSES = 3
 # What a rigid motion leaves of still parts has a mean square of 1 over its noise, which the noise model may have
 # wrong by this factor; chance adds at most so many standard deviations (one still border in 30,000 is refused).
 _NOISE_FACTOR, _SIGMAS = 1.3, 4.0
+# What air does to a border is smooth: a polynomial of this degree along both. One still border in so many is refused.
+_SMOOTH, _LEAST_CHANCE = 4, 1e-4
 # Fewer windows than this say nothing of a rigid motion: in all, and in one of several parts.
 _LEAST_WINDOWS, _LEAST_IN_PART = 12, 4
 # A window that knows its shift no better than to a pixel shows nothing: a bare wall is of such windows.
@@ -79,19 +82,27 @@ class Rigid:
 
     `shift` is that of all windows without the motion. The columns of `root_px` are what stays unknown of it, in
     motions of one standard deviation; `unlike` is the mean square, over its noise, of what the motion leaves of the
-    windows that were asked.
+    windows that were asked, and `by_chance` how likely noise alone would leave so much that is alike in neighbours.
     """
 
     shift: ShiftMeasurement
     motion_px: Motion
     root_px: Float[np.ndarray, "6 6"]
     unlike: float
+    by_chance: float
     windows: int
 
     @property
     def is_rigid(self) -> bool:
-        """Whether what the motion leaves is noise."""
-        return is_noise(self.unlike, self.windows)
+        """Whether what the motion leaves is noise: no more than that, and no likeness between neighbours."""
+        return is_noise(self.unlike, self.windows) and self.by_chance > _LEAST_CHANCE
+
+    @property
+    def left(self) -> str:
+        """What the motion leaves, in words."""
+        if is_noise(self.unlike, self.windows):
+            return "what a rigid motion leaves of it is alike in neighbouring windows, as air would do it"
+        return f"what a rigid motion leaves of it is {self.unlike**0.5:.1f} times its noise"
 
 
 def read_motion(exposures: Exposures, windows: Mask, prior: MotionPrior) -> Rigid | None:
@@ -118,8 +129,48 @@ def _fitted(
         taken_px + rest_px,
         vectors * np.sqrt(np.maximum(values, 0.0)),
         float(squares.sum() / max(2 * good.sum() - fitted, 1.0)),
+        _by_chance(shift, left_px, good, optics),
         int(good.sum()),
     )
+
+
+def _by_chance(
+    shift: ShiftMeasurement, left_px: Float[np.ndarray, "windows 2"], good: Mask, optics: Optics
+) -> float:
+    """How likely white noise would leave so much of some windows that is smooth: an F test.
+
+    Air moves neighbours alike, noise each by itself. How large the noise is does not matter.
+    """
+    root = np.linalg.cholesky(shift.information_per_px2[good]).transpose(0, 2, 1)
+    left = np.einsum("wab,wb->wa", root, left_px[good]).ravel()
+    rigid = motion_basis(shift.centres_px[good], optics)
+    free, powers = left.size - MOTIONS, _SMOOTH
+    while powers and 2 * _smooth_count(powers) > free // 2:
+        powers -= 1
+    if powers < 2:
+        return 1.0
+    x, y = (2.0 * shift.centres_px[good] / (optics.width_px, optics.height_px) - 1.0).T
+    terms = np.stack([x**i * y**j for i in range(powers + 1) for j in range(powers + 1 - i)], axis=-1)
+    smooth = np.einsum("wt,ab->watb", terms, np.eye(2)).reshape(len(terms), 2, -1)
+    weighted = [np.einsum("wab,wbp->wap", root, one).reshape(left.size, -1) for one in (rigid, smooth)]
+    both = np.linalg.svd(np.concatenate(weighted, axis=1), full_matrices=False)
+    of_rigid = np.linalg.svd(weighted[0], full_matrices=False)
+    (all_of_it, rank), (alone, few) = (_explained(left, *one) for one in (both, of_rigid))
+    rest = float(left @ left) - all_of_it
+    count, free = rank - few, left.size - rank
+    if count < 1 or free < 1 or rest <= 0.0:
+        return 1.0
+    return float(special.fdtrc(count, free, (all_of_it - alone) / count / (rest / free)))
+
+
+def _explained(left: np.ndarray, u: np.ndarray, sizes: np.ndarray, _: np.ndarray) -> tuple[float, int]:
+    """Sum of squares that a basis explains, and its rank."""
+    rank = int((sizes > 1e-6 * sizes[0]).sum())
+    return float(np.sum((u[:, :rank].T @ left) ** 2)), rank
+
+
+def _smooth_count(powers: int) -> int:
+    return (powers + 1) * (powers + 2) // 2
 
 
 def trusted(exposures: Exposures, parts: Sequence[Yardstick], prior: MotionPrior) -> "Trusted":
@@ -193,7 +244,7 @@ def _why_not(part: Yardstick, good: Mask) -> str | None:
 def _not_still(read: Rigid) -> str | None:
     if read.is_rigid:
         return None
-    return f"what a rigid motion leaves of it is {read.unlike**0.5:.1f} times its noise, so it is not still"
+    return f"{read.left}, so it is not still"
 
 
 def _odd_ones(exposures: Exposures, parts: list[Yardstick], prior: MotionPrior) -> list[Yardstick]:
