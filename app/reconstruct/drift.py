@@ -50,7 +50,7 @@ class Agreement:
     drift_px: Motion
     middle_px: Float[np.ndarray, " 2"]
     typical_px: float
-    unlike: float
+    left: str
     agree: bool
 
     @property
@@ -60,7 +60,7 @@ class Agreement:
         if self.agree:
             return moved
         return (
-            f"{moved} That does not explain how they differ: what is left is {self.unlike**0.5:.1f} times the noise. "
+            f"{moved} That does not explain how they differ: {self.left}. "
             "The air was not still in one of them, or something moved. Wait longer before each, and take the series "
             "again."
         )
@@ -76,11 +76,11 @@ def agreement(before: Exposures, in_room: Mask) -> Agreement:
     """Two references, seen through still air: every window of the wall is a yardstick."""
     read = read_motion(before, in_room, mount(_UNBOUND_PX))
     if read is None:
-        return Agreement(STILL, np.zeros(2), 0.0, 0.0, True)
+        return Agreement(STILL, np.zeros(2), 0.0, "", True)
     basis = motion_basis(read.shift.centres_px[in_room], before.optics)
     typical_px = float(np.sqrt(np.mean(np.sum((basis @ read.motion_px) ** 2, axis=1))))
     return Agreement(
-        read.motion_px, _of_middle(read.motion_px, before.optics), typical_px, read.unlike, read.is_rigid
+        read.motion_px, _of_middle(read.motion_px, before.optics), typical_px, read.left, read.is_rigid
     )
 
 

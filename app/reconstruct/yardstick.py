@@ -101,8 +101,8 @@ class Rigid:
     def left(self) -> str:
         """What the motion leaves, in words."""
         if is_noise(self.unlike, self.windows):
-            return "what a rigid motion leaves of it is alike in neighbouring windows, as air would do it"
-        return f"what a rigid motion leaves of it is {self.unlike**0.5:.1f} times its noise"
+            return "what a rigid motion leaves is alike in neighbouring windows, as air would do it"
+        return f"what a rigid motion leaves is {self.unlike**0.5:.1f} times its noise"
 
 
 def read_motion(exposures: Exposures, windows: Mask, prior: MotionPrior) -> Rigid | None:
@@ -188,7 +188,7 @@ def trusted(exposures: Exposures, parts: Sequence[Yardstick], prior: MotionPrior
         if whole is None or whole.is_rigid or len(kept) == 1:
             return Trusted(tuple(one.name for one in kept), whole, tuple(refused))
         odd = _odd_ones(exposures, kept, prior)
-        refused.append(_unlike_others([one.name for one in odd], whole.unlike))
+        refused.append(_unlike_others([one.name for one in odd], whole))
         kept = [one for one in kept if one not in odd]
     return Trusted((), None, tuple(refused))
 
@@ -256,9 +256,9 @@ def _odd_ones(exposures: Exposures, parts: list[Yardstick], prior: MotionPrior) 
     return [parts[int(np.argmin(unlike))]]
 
 
-def _unlike_others(names: list[str], unlike: float) -> str:
+def _unlike_others(names: list[str], whole: Rigid) -> str:
     how, which = ("do not move alike", "one") if len(names) > 1 else ("do not move as the others do", "them")
     return (
-        f"The {' and '.join(names)} {how}: what one rigid motion leaves is {unlike**0.5:.1f} times the noise. "
+        f"The {' and '.join(names)} {how}: {whole.left}. "
         f"The room's air is before {which}, or somebody touched {which}."
     )
