@@ -47,7 +47,7 @@ def test_a_flow_between_two_references_knows_the_mount_better(experiment):
         CapturePlan(frames=50),
     )
     assert found.agree
-    assert "the camera moved by" in found.said
+    assert "the camera moved:" in found.said
     captures = newest_pair(experiment)
     assert set(captures.names) == {"reference", "flow", "after"}
     assert captures.reference.folder == found.taken[0].folder

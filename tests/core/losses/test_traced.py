@@ -50,7 +50,7 @@ def test_rays_through_the_network_see_what_the_vertex_grid_sees(scene):
     )
     information = np.broadcast_to(np.eye(2), (len(centres), 2, 2)).copy()
     shift = ShiftMeasurement(centres, np.zeros_like(centres), information, 1)
-    view = traced_windows(scene, 0, shift, 0.0, np.zeros((len(centres), 2, 4)))
+    view = traced_windows(scene, 0, shift, 0.0, np.zeros((len(centres), 2, 6)))
 
     loss = traced(view)
     (rows,) = jax.jit(lambda u: loss.rows(u.representation, u, None))(Unknowns(air))
@@ -90,11 +90,13 @@ def test_the_rendered_picture_of_the_true_air_is_the_flow_image_and_its_gradient
 
 
 def test_a_motion_of_the_camera_adds_to_the_shift():
-    motions = np.zeros((1, 2, 4))
+    motions = np.zeros((1, 2, 6))
     motions[0, :, 0] = (0.5, -0.25)
     shift = ShiftMeasurement(np.array([[20.0, 20.0]]), np.zeros((1, 2)), np.eye(2)[None], 1)
     loss, air = traced(traced_windows(PRINT, 0, shift, 0.0, motions)), network()
-    rows = [loss.rows(air, Unknowns(air, jnp.array([[q, 0.0, 0.0, 0.0]])), None)[0] for q in (0.0, 2.0)]
+    rows = [
+        loss.rows(air, Unknowns(air, jnp.array([[q, 0.0, 0.0, 0.0, 0.0, 0.0]])), None)[0] for q in (0.0, 2.0)
+    ]
     weight = (loss.weight / rows[0].size) ** 0.5
     np.testing.assert_allclose((rows[1] - rows[0]).ravel(), weight * np.array([1.0, -0.5]), rtol=1e-4)
 
