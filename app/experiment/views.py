@@ -41,6 +41,13 @@ def own_cameras(experiment: Experiment) -> tuple[int, ...]:
     return tuple(n for n, view in enumerate(experiment.settings.scene.views) if view.camera_of is None)
 
 
+def lamp_number(experiment: Experiment, view: int) -> int:
+    """The number of the view whose projector lights a view: the first of those of its wall that see by it."""
+    scene = experiment.settings.scene
+    lights = [(one.wall, one.light or scene.light) for one in scene.views]
+    return lights.index(lights[view])
+
+
 def take_turns(experiment: Experiment) -> bool:
     """Whether one camera takes the pictures of several views, under one projector after the other."""
     return any(view.camera_of is not None for view in experiment.settings.scene.views)

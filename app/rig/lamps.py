@@ -1,4 +1,4 @@
-"""Projectors that light one wall in turn, for one camera: all are dark but that of the view whose turn it is.
+"""Projectors that light one wall in turn: all are dark but that of the view whose turn it is.
 
 Each shows its own pattern all the time; dark is its own "mute", which blanks the picture and leaves the lamp.
 """
@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, closing, nullcontext
 
 from app.errors import AirlensError
 from app.experiment.folder import Experiment
-from app.experiment.views import camera_number, view_names
+from app.experiment.views import lamp_number, view_names
 from app.rig.live_projector import LiveProjector
 from app.rig.open import open_projector
 from drivers.projector.protocol import Projector
@@ -25,20 +25,21 @@ class Lamps:
         self._opens = opens or (lambda view: closing(open_projector(experiment, view)))
 
     def light(self, view: int) -> None:
-        """Let the view's projector alone light its wall; nothing where its camera sees no other.
+        """Let the view's projector alone light its wall; nothing where no camera sees several in turn there.
 
         A simulated rig lights each picture as its view states. Raises BadInputError for a projector that the rig does
         not name, AirlensError for one that does not do as it is told, DeviceError.
         """
         if self._experiment.settings.rig.camera_kind == "simulated":
             return
-        owner = camera_number(self._experiment, view)
-        numbers = range(len(view_names(self._experiment)))
-        turns = [n for n in numbers if camera_number(self._experiment, n) == owner]
-        if len(turns) < 2:
+        views = self._experiment.settings.scene.views
+        same_wall = [n for n, one in enumerate(views) if one.wall == views[view].wall]
+        if not any(views[n].camera_of for n in same_wall):
             return
-        for number in (*(n for n in turns if n != view), view):
-            self._mute(number, number != view)
+        lamp = lamp_number(self._experiment, view)
+        for other in {lamp_number(self._experiment, n) for n in same_wall} - {lamp}:
+            self._mute(other, True)
+        self._mute(lamp, False)
 
     def _mute(self, number: int, dark: bool) -> None:
         name = view_names(self._experiment)[number]

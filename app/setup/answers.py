@@ -28,6 +28,8 @@ from core.geometry import WallName
 
 # At most so many things of one kind are in a room.
 MANY = 100
+# What the first camera is called, which `camera` answers.
+FIRST = "camera"
 Pixels = Annotated[int, Field(ge=16, le=20_000)]
 
 
@@ -122,6 +124,21 @@ class ViewAnswer(EyeAnswer):
     """A projector instead of a print on its wall."""
     pattern_seed: int = 0
     """Which of all random patterns is on its wall."""
+
+
+class LightAnswer(ProjectorAnswer):
+    """A further projector on a wall that one lights already: a second line of sight without a second camera.
+
+    They light the wall in turn, for the same camera, which takes a picture under each. All are dark but one then, so
+    each of them is spoken to where this machine takes the pictures. A print cannot be switched off.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=60)]
+    """What the pictures under it are called, in captures and calibrations."""
+    camera_of: str = FIRST
+    """The camera that takes them: `camera` is the first one, else the name of a `view`."""
+    pattern_seed: int = 0
+    """Which of all random patterns it shows."""
 
 
 class OpeningAnswer(Strict):
@@ -264,6 +281,8 @@ class Answers(Strict):
     """Which of all random patterns."""
     view: tuple[ViewAnswer, ...] = Field(default=(), max_length=MANY)
     """Further cameras, each before its wall."""
+    light: tuple[LightAnswer, ...] = Field(default=(), max_length=MANY)
+    """Further projectors, each in turn with those of its camera's wall."""
     supply: tuple[SupplyAnswer, ...] = Field(default=(), max_length=MANY)
     """Where air is blown in."""
     outlet: tuple[OutletAnswer, ...] = Field(default=(), max_length=MANY)

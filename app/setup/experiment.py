@@ -109,10 +109,10 @@ def change_answers(experiment: Experiment, data: dict[str, Any]) -> Experiment:
             "camera.truth: the room that a simulated camera looks at cannot be changed. Make a new experiment."
         )
     view = asked_view(experiment.settings.scene)
-    if after.view and view is not experiment.settings.scene.views[0]:
+    if (after.view or after.light) and view is not experiment.settings.scene.views[0]:
         raise BadInputError(
-            f"view: {view.name!r}, which looks at y_max, is not the first camera of experiment.toml. Put it first, "
-            "or change further cameras there."
+            f"{'view' if after.view else 'light'}: {view.name!r}, which looks at y_max, is not the first camera of "
+            "experiment.toml. Put it first, or change further cameras and projectors there."
         )
     listed = listed_tables(experiment)
     try:

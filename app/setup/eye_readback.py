@@ -7,9 +7,10 @@ import numpy as np
 
 from app.experiment.folder import ExperimentSettings
 from app.experiment.rig_settings import CameraSettings, SimulatedCameraSettings
+from app.setup.answers import FIRST
 from app.setup.written import SceneReading
 from core.geometry import Optics
-from core.scene import CheckerPattern, ProjectedPattern, View
+from core.scene import CheckerPattern, Light, ProjectedPattern, View
 from core.view_frame import turn_to
 
 
@@ -28,21 +29,32 @@ def view_answers(settings: ExperimentSettings, told: SceneReading) -> list[dict[
     """The further cameras, of a scene whose first one is answered as `camera`."""
     rig, scene = settings.rig, settings.scene
     lit, answers = {"y_max"}, []
-    for view in scene.views[1:]:
+    for view in (one for one in scene.views[1:] if one.camera_of is None):
         simulated = isinstance(rig.camera, SimulatedCameraSettings)
         device = rig.camera if simulated else (rig.cameras or {}).get(view.name)
         answer = {"name": view.name, "wall": view.wall} | _eye(view, device, told)
         light = view.light or scene.light
         if view.wall not in lit:
-            if not isinstance(light.pattern, CheckerPattern):
-                answer["pattern_seed"] = light.pattern.seed
+            answer |= _pattern(light)
             if isinstance(light, ProjectedPattern):
-                answer["projector"] = projector_answer(light.projector, "", told)
+                answer["projector"] = projector_answer(light.projector, _address(settings, view), told)
         elif view.wall == "y_max" and view.light is not None:
             told.unsaid.append(f"{view.name} sees {view.wall} by a light of its own.")
         lit.add(view.wall)
         answers.append(answer)
     return answers
+
+
+def light_answers(settings: ExperimentSettings, told: SceneReading) -> list[dict[str, Any]]:
+    """The further projectors, of a scene whose first camera is answered as `camera`."""
+    first = settings.scene.views[0].name
+    return [
+        {"name": view.name, "camera_of": FIRST if view.camera_of == first else view.camera_of}
+        | _pattern(view.light)
+        | projector_answer(view.light.projector, _address(settings, view), told)
+        for view in settings.scene.views
+        if view.camera_of is not None and isinstance(view.light, ProjectedPattern)
+    ]
 
 
 def projector_answer(optics: Optics, url: str, told: SceneReading) -> dict[str, Any]:
@@ -54,6 +66,16 @@ def projector_answer(optics: Optics, url: str, told: SceneReading) -> dict[str, 
         "angle_of_view": f"{_angle_deg(optics):.9g} deg",
         "url": url,
     }
+
+
+def _pattern(light: Light) -> dict[str, Any]:
+    return {} if isinstance(light.pattern, CheckerPattern) else {"pattern_seed": light.pattern.seed}
+
+
+def _address(settings: ExperimentSettings, view: View) -> str:
+    """Where a view's own projector is spoken to."""
+    spoken = (settings.rig.projectors or {}).get(view.name)
+    return spoken.url if spoken else ""
 
 
 def _eye(view: View, device: CameraSettings | None, told: SceneReading) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from app.setup.answers import (
     AnemometerAnswer,
     Answers,
     CameraAnswer,
+    LightAnswer,
     ObjectAnswer,
     OpeningAnswer,
     OutletAnswer,
@@ -41,6 +42,7 @@ _ONES: dict[str, Any] = {
 }
 _LISTS: dict[str, Any] = {
     "view": ViewAnswer,
+    "light": LightAnswer,
     "supply": SupplyAnswer,
     "outlet": OutletAnswer,
     "surface": SurfaceAnswer,
@@ -49,7 +51,7 @@ _LISTS: dict[str, Any] = {
     "thermometer": ThermometerAnswer,
     "anemometer": AnemometerAnswer,
 }
-# Each sound part of the answers by its path: `("room",)`, `("supply", 0)`.
+# Each part of the answers by its path, `("room",)`, `("supply", 0)`; None where it has a mistake of its own.
 Parts = Mapping[Path, Any]
 
 
@@ -60,7 +62,7 @@ def mistakes_in(data: Mapping[str, Any]) -> list[Said]:
     except ValidationError as error:
         # How many supplies and outlets there are can be told of those that are wrong too.
         trapped = _trapped_air(*(_count(data.get(name)) for name in ("supply", "outlet")))
-        return [*said_of(error, data, Answers), *trapped, *_contradictions(_sound_parts(data))]
+        return [*said_of(error, data, Answers), *trapped, *_contradictions(_written_parts(data))]
     return contradictions(answers)
 
 
@@ -110,7 +112,7 @@ def _contradictions(parts: Parts) -> list[Said]:
     return [said for check in checks for said in check(parts)]
 
 
-def _sound_parts(data: Mapping[str, Any]) -> Parts:
+def _written_parts(data: Mapping[str, Any]) -> Parts:
     written: dict[Path, tuple[Any, Any]] = {
         (name,): (data[name], kind) for name, kind in _ONES.items() if name in data
     }
@@ -122,12 +124,12 @@ def _sound_parts(data: Mapping[str, Any]) -> Parts:
         try:
             found[path] = TypeAdapter(kind).validate_json(_json(value), strict=True)
         except ValidationError:
-            continue
+            found[path] = None
     return found
 
 
 def _named(parts: Parts, *names: str) -> list[tuple[Path, Any]]:
-    return [(path, part) for path, part in parts.items() if path[0] in names]
+    return [(path, part) for path, part in parts.items() if path[0] in names and part is not None]
 
 
 def _openings(parts: Parts) -> list[tuple[Path, OpeningAnswer]]:

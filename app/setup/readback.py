@@ -13,7 +13,7 @@ from app.errors import BadInputError
 from app.experiment.boundary import read_sensor_table
 from app.experiment.folder import Experiment, ExperimentSettings
 from app.setup.answers import MANY
-from app.setup.eye_readback import camera_answer, projector_answer, view_answers
+from app.setup.eye_readback import camera_answer, light_answers, projector_answer, view_answers
 from app.setup.written import SceneReading, celsius, metres
 from core.geometry import Vector3, face_of
 from core.objects import RoomObject
@@ -70,6 +70,7 @@ def scene_back(settings: ExperimentSettings) -> ReadBack:
     answers["object"] = [_object(item, told) for item in settings.scene.objects]
     if view is settings.scene.views[0]:
         answers["view"] = view_answers(settings, told)
+        answers["light"] = light_answers(settings, told)
     else:
         others = [one.name for one in settings.scene.views if one is not view]
         told.unsaid.append(f"Further cameras: {', '.join(others)}.")

@@ -104,6 +104,15 @@ distance = "4 m"
 pattern_seed = 1
 [view.projector]
 width_px = 1920
+[[light]]
+name = "projector 2"
+camera_of = "right"
+position = ["1 m", "2 m", "1.3 m"]
+width_px = 1920
+height_px = 1200
+angle_of_view = "40 deg"
+url = "pjlink://192.168.0.21"
+pattern_seed = 2
 [[supply]]
 speed = "0.28 m/s"
 [[wall]]

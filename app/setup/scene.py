@@ -7,7 +7,17 @@ from app.experiment.folder import ExperimentSettings
 from app.experiment.rig_settings import ProjectorSettings, RigSettings
 from app.setup.answers import Answers, ObjectAnswer, OpeningAnswer, SupplyAnswer
 from app.setup.mistakes import contradictions, field_name
-from app.setup.views import device_of, devices_of, eye_of, further_views, light_of, moved, view_of
+from app.setup.views import (
+    addresses_of,
+    device_of,
+    devices_of,
+    eye_of,
+    further_lights,
+    further_views,
+    light_of,
+    moved,
+    view_of,
+)
 from core.air import Air
 from core.geometry import WALLS, Box, Vector3, face_of
 from core.objects import RoomObject, ready_object
@@ -43,10 +53,11 @@ def described(answers: Answers, corner_m: Vector3) -> ExperimentSettings:
     room = Box(lower_m=corner_m, upper_m=moved(answers.room, corner_m))
     try:
         optics = eye_of(answers.camera, "y_max", room)
+        cameras = (view_of(answers.camera, optics), *further_views(answers, room))
         scene = Scene(
             room=room,
             air=Air(ambient_temperature_k=answers.air),
-            views=(view_of(answers.camera, optics), *further_views(answers, room)),
+            views=(*cameras, *further_lights(answers, room, cameras)),
             light=light_of(answers.projector, answers.pattern_seed, optics, "y_max", room),
             boundary=tuple(_boundary(answers, room)),
             objects=tuple(object_of(item, n, room.lower_m) for n, item in enumerate(answers.object)),
@@ -97,7 +108,10 @@ def _rig(answers: Answers) -> RigSettings:
     projector = answers.projector
     spoken = ProjectorSettings(url=projector.url) if projector and projector.url else None
     return RigSettings(
-        camera=device_of(answers.camera), cameras=devices_of(answers.view) or None, projector=spoken
+        camera=device_of(answers.camera),
+        cameras=devices_of(answers.view) or None,
+        projector=spoken,
+        projectors=addresses_of(answers) or None,
     )
 
 

@@ -4,10 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from app.errors import BadInputError
 from app.experiment.folder import TRUTH_FILE
 from app.experiment.rig_settings import (
     AravisCameraSettings,
     CameraSettings,
+    ProjectorSettings,
     SimulatedCameraSettings,
     V4l2CameraSettings,
 )
@@ -75,6 +77,21 @@ def further_views(answers: Answers, room: Box) -> list[View]:
     return views
 
 
+def further_lights(answers: Answers, room: Box, cameras: Sequence[View]) -> list[View]:
+    """A view for each further projector: that of its camera, under this light. Raises BadInputError."""
+    owners = {view.name: view for view in cameras}
+    views = []
+    for item in answers.light:
+        owner = owners.get(item.camera_of)
+        if owner is None:
+            raise BadInputError(
+                f"light: {item.name!r} is seen by {item.camera_of!r}, which is no camera here."
+            )
+        light = light_of(item, item.pattern_seed, owner.camera, owner.wall, room)
+        views.append(replace(owner, name=item.name, camera_of=owner.name, light=light))
+    return views
+
+
 def device_of(camera: EyeAnswer) -> CameraSettings:
     """The device that a camera is read from."""
     if camera.kind == "simulated":
@@ -95,6 +112,14 @@ def device_of(camera: EyeAnswer) -> CameraSettings:
 def devices_of(views: Sequence[ViewAnswer]) -> dict[str, CameraSettings]:
     """The devices of further views by their names; those of a simulated rig are its first camera's twins."""
     return {item.name: device_of(item) for item in views if item.kind != "simulated"}
+
+
+def addresses_of(answers: Answers) -> dict[str, ProjectorSettings]:
+    """The projectors that are spoken to beside the first one, by the names of their views."""
+    thrown = {item.name: item.projector for item in answers.view} | {
+        item.name: item for item in answers.light
+    }
+    return {name: ProjectorSettings(url=one.url) for name, one in thrown.items() if one and one.url}
 
 
 def _back(turn: Turn, optics: Optics) -> Optics:

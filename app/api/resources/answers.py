@@ -205,6 +205,7 @@ def _told(settings: ExperimentSettings) -> RoomTold:
                 wall_m=list(wall_m(scene, number)),
             )
             for number, view in enumerate(scene.views)
+            if view.camera_of is None
         ],
         standing=list(_all_standing(scene)),
         settings=to_plain(settings),
@@ -215,11 +216,18 @@ def _all_standing(scene: Scene) -> Iterator[StandingResource]:
     """Every camera, and every projector once, with what it covers of its wall."""
     told: list[Light] = []
     for view in scene.views:
-        yield _standing("camera", view.name, view.camera, view.wall, scene.room)
+        if view.camera_of is None:
+            yield _standing("camera", view.name, view.camera, view.wall, scene.room)
         light = view.light or scene.light
         if isinstance(light, ProjectedPattern) and light not in told:
             told.append(light)
-            name = "projector" if len(told) == 1 else f"projector of {view.name}"
+            name = (
+                view.name
+                if view.camera_of
+                else "projector"
+                if len(told) == 1
+                else f"projector of {view.name}"
+            )
             yield _standing("projector", name, light.projector, view.wall, scene.room)
 
 

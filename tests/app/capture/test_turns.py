@@ -133,6 +133,22 @@ def test_all_projectors_are_dark_but_the_one_whose_turn_it_is(real):
     assert named_camera(real, 1) == real.settings.rig.camera
 
 
+def test_another_camera_of_the_wall_sees_by_the_first_projector_alone(real):
+    scene = real.settings.scene
+    beside = replace(scene, views=(*scene.views, replace(scene.views[0], name="beside")))
+    rig = real.settings.rig.model_copy(update={"cameras": {"beside": real.settings.rig.camera}})
+    experiment = save_settings(real.folder, real.settings.model_copy(update={"rig": rig, "scene": beside}))
+    room = Room(experiment)
+    with room.camera() as camera:
+        taken = take(
+            camera, experiment, CapturePlan(frames=2), opens=lambda view: room.camera(), lamps=room.lamps
+        )
+    assert taken.folder is not None
+    levels = [float(image.mean.mean()) for image in load_capture(taken.folder).images]
+    np.testing.assert_allclose(levels, [0.2, 0.4, 0.2], atol=0.03)
+    assert set(room.asked) == {0, 1}
+
+
 def test_a_projector_that_is_not_there_or_does_not_obey_is_named(real):
     with Room(real).camera() as camera, pytest.raises(BadInputError, match="that is in turn, not at once"):
         take(camera, real, CapturePlan(frames=2), at_once=True)

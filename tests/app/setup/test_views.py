@@ -114,9 +114,14 @@ def test_a_view_is_added_and_removed_again(tmp_path):
         ([RIGHT | {"kind": "simulated"}], ("view", 0, "kind"), "expected v4l2 or aravis"),
         ([RIGHT | {"wall": "y_max", "projector": THROWN}], ("view", 0, "projector"), "pattern of 'camera'"),
         (
-            [RIGHT | {"projector": THROWN | {"url": "pjlink://10.0.0.2"}}],
-            ("view", 0, "projector", "url"),
-            "by hand",
+            [
+                RIGHT | {"projector": THROWN | {"url": "pjlink://10.0.0.2"}},
+                RIGHT
+                | {"name": "top", "wall": "z_max", "device": "/dev/video4"}
+                | {"projector": THROWN | {"url": "pjlink://10.0.0.2"}},
+            ],
+            ("view", 1, "projector", "url"),
+            "its own address",
         ),
         (
             [RIGHT | {"projector": THROWN | {"position": ["5 m", "1 m", "2 m"]}}],
