@@ -1,36 +1,25 @@
-"""What `airlens new` asks, in the order of the page: devices, room, wall, place, further cameras.
+"""What `airlens new` asks, in the order of the page: devices, room, wall, place, further projectors and cameras.
 
 The answers begin as a template's, so that each question has a default, and each answer replaces one of them.
 """
 
 import copy
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cache
+from collections.abc import Sequence
 
 from app.errors import BadInputError
 from app.files.toml import parse, toml_data
-from app.interview.ask import NOTHING, Asked, ask_choice, ask_field, ask_number
+from app.interview.ask import Asked, ask_choice, ask_field, ask_number
 from app.interview.conversation import Flow, Question, Remark
+from app.interview.projectors import PROJECTOR, Inventory, ask_lights, ask_projector
 from app.interview.room import ask_room
-from app.interview.tree import Tree, put, value_at
-from app.interview.views import PROJECTOR, ask_lens, ask_views
-from app.rig.inventory import CameraChoice, found_cameras
-from app.rig.ports import FoundPort, FoundProjector, found_ports, who_is_there
-from app.setup.answers import Answers
+from app.interview.tree import Tree, value_at
+from app.interview.views import ask_lens, ask_views
+from app.rig.inventory import CameraChoice
+from app.setup.answers import FIRST, Answers
 from app.setup.experiment import ANSWERS_FILE, SAMPLE, TEMPLATES, corner_of, room_of, template
 from app.setup.scene import picture_told, settings_of
 
 ROOMS = tuple(name for name in TEMPLATES if name != SAMPLE)
-
-
-@dataclass(frozen=True)
-class Inventory:
-    """What is found on this machine; a port is asked at most once."""
-
-    cameras: Sequence[CameraChoice] = field(default_factory=found_cameras)
-    ports: Sequence[FoundPort] = field(default_factory=found_ports)
-    who: Callable[[str], FoundProjector | None] = field(default_factory=lambda: cache(who_is_there))
 
 
 def questions(inventory: Inventory) -> Flow:
@@ -43,7 +32,8 @@ def questions(inventory: Inventory) -> Flow:
     yield from ask_room(tree)
     yield from _ask_wall(tree, inventory)
     yield from _ask_place(tree)
-    yield from ask_views(tree)
+    yield from ask_lights(tree, FIRST, inventory)
+    yield from ask_views(tree, inventory)
     return tree
 
 
@@ -104,30 +94,7 @@ def _ask_wall(tree: Tree, inventory: Inventory) -> Asked:
         tree.pop("projector", None)
         return
     tree.setdefault("projector", copy.deepcopy(PROJECTOR))
-    for axis in range(3):
-        yield from ask_field(tree, ("projector", "position", axis), f"Projector's lens, {'xyz'[axis]}", "m")
-    yield from ask_field(tree, ("projector", "angle_of_view"), "Projector's angle of view across", "deg")
-    yield from ask_number(tree, ("projector", "width_px"), "Projector's columns [px]")
-    yield from ask_number(tree, ("projector", "height_px"), "Projector's rows [px]")
-    yield from _ask_address(tree, inventory)
-
-
-def _ask_address(tree: Tree, inventory: Inventory) -> Asked:
-    """A port is asked who is there once somebody chose it: bytes go over its line."""
-    devices = [port.device for port in inventory.ports]
-    about = [port.description for port in inventory.ports]
-    options = [NOTHING, "address", *devices]
-    told = ["it is switched on and off by hand", "its address on the network is known", *about]
-    where = yield from ask_choice("Where the projector is spoken to", options, NOTHING, told)
-    path = ("projector", "url")
-    if where in devices:
-        found = inventory.who(where)
-        yield Remark(f"{where}: {f'{found.name}, {found.power}' if found else 'nobody answers'}.")
-        put(tree, path, found.url if found else f"escvp21:{where}")
-    if where != NOTHING:
-        yield from ask_field(
-            tree, path, "Projector's address, such as pjlink://192.168.0.20", can_be_open=True
-        )
+    yield from ask_projector(tree, ("projector",), inventory)
 
 
 def _ask_place(tree: Tree) -> Asked:

@@ -3,8 +3,9 @@
 import copy
 
 from app.files.toml import parse
-from app.interview.ask import Asked, ask_choice, ask_count, ask_either, ask_field, ask_number, ask_position
+from app.interview.ask import Asked, ask_choice, ask_count, ask_either, ask_field, ask_number
 from app.interview.conversation import Again, Remark
+from app.interview.projectors import PROJECTOR, Inventory, ask_lights, ask_projector
 from app.interview.room import WALL_WORDS, counting
 from app.interview.tree import Path, Tree, put, sentence_at, value_at
 from app.setup.answers import Answers
@@ -12,19 +13,13 @@ from app.setup.experiment import ANSWERS_FILE
 from app.setup.scene import picture_told, settings_of
 from core.geometry import WALLS
 
-PROJECTOR: Tree = {
-    "position": ["1 m", "-1 m", "1.3 m"],
-    "width_px": 1920,
-    "height_px": 1200,
-    "angle_of_view": "40 deg",
-}
 LENSES = (("angle_of_view", "deg"), ("focal_length", "mm"))
 # Of the first camera, what a further one does not have as well until it is asked.
 _OWN = ("device", "distance", "position", "truth")
 
 
-def ask_views(tree: Tree) -> Asked:
-    """Ask for the cameras beside the first one."""
+def ask_views(tree: Tree, inventory: Inventory) -> Asked:
+    """Ask for the cameras beside the first one, each with the projectors that light its wall in turn."""
     there = tree.get("view", [])
     text = "How many further cameras look at a patterned wall"
     count = yield from ask_count(tree, text, len(there), ("view",))
@@ -33,11 +28,12 @@ def ask_views(tree: Tree) -> Asked:
         if number >= len(there):
             tree["view"].append(_fresh(tree, number))
         path = ("view", number)
-        asked = yield from counting(_ask_view(tree, path, f"camera {number + 2}"))
+        asked = yield from counting(_ask_view(tree, path, inventory, f"camera {number + 2}"))
         wrong = sentence_at(tree, path)
         if wrong:
             yield Again(wrong, asked)
         yield Remark(picture_told(settings_of(parse(tree, Answers, ANSWERS_FILE)).scene, number + 1))
+        yield from ask_lights(tree, tree["view"][number]["name"], inventory)
     if not count:
         del tree["view"]
 
@@ -50,7 +46,7 @@ def _fresh(tree: Tree, number: int) -> Tree:
     return view | device | {name: value for name, value in first.items() if name not in _OWN}
 
 
-def _ask_view(tree: Tree, path: Path, name: str) -> Asked:
+def _ask_view(tree: Tree, path: Path, inventory: Inventory, name: str) -> Asked:
     yield from ask_field(tree, (*path, "name"), f"{name}: what it is called")
     wall = yield from ask_choice(
         f"{name}: wall that it looks at",
@@ -68,7 +64,7 @@ def _ask_view(tree: Tree, path: Path, name: str) -> Asked:
     yield from ask_number(tree, (*path, "height_px"), f"{name}: rows of the picture [px]")
     yield from ask_field(tree, (*path, "distance"), f"{name}: distance to its wall", "m")
     if not _is_lit(tree, path, wall):
-        yield from _ask_pattern(tree, path, name)
+        yield from _ask_pattern(tree, path, inventory, name)
 
 
 def ask_lens(tree: Tree, path: Path, text: str, name: str = "") -> Asked:
@@ -88,7 +84,7 @@ def _is_lit(tree: Tree, path: Path, wall: str) -> bool:
     return wall in ("y_max", *before)
 
 
-def _ask_pattern(tree: Tree, path: Path, name: str) -> Asked:
+def _ask_pattern(tree: Tree, path: Path, inventory: Inventory, name: str) -> Asked:
     words = ("print", "projector")
     told = ("a printed pattern hangs on its wall", "a projector shows the pattern")
     default = words["projector" in value_at(tree, path)]
@@ -96,8 +92,4 @@ def _ask_pattern(tree: Tree, path: Path, name: str) -> Asked:
         put(tree, (*path, "projector"), None)
         return
     value_at(tree, path).setdefault("projector", copy.deepcopy(PROJECTOR))
-    place = (*path, "projector")
-    yield from ask_position(tree, place, f"{name}: projector's lens")
-    yield from ask_field(tree, (*place, "angle_of_view"), f"{name}: projector's angle of view across", "deg")
-    yield from ask_number(tree, (*place, "width_px"), f"{name}: projector's columns [px]")
-    yield from ask_number(tree, (*place, "height_px"), f"{name}: projector's rows [px]")
+    yield from ask_projector(tree, (*path, "projector"), inventory, f"{name}: projector")

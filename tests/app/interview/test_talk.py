@@ -196,6 +196,8 @@ projector
 40
 1920
 1200
+none
+no
 """
 
 
@@ -313,12 +315,75 @@ def test_a_projectors_port_is_asked_who_is_there(tmp_path):
         thrown = f"projector\n3 m\n-1 m\n1.3 m\n40 deg\n1920\n1200\n{device}\n\n"
         answers, script = answered(
             tmp_path / "lab",
-            changed("print\n", thrown),
+            changed("print\n", thrown).replace("\n50\n", "\n50\nno\n"),
             ports=(FoundPort(device, "a port"),),
             who=who_is_there,
         )
     assert answers["projector"]["url"] == f"benq:{device}"
     assert any(device in told and "standby" in told for told in script.told)
+
+
+# The wall has a projector; a further one is asked for, and another, each with a slip.
+FIRST_THROWN = "projector\n3 m\n-1 m\n1.3 m\n40 deg\n1920\n1200\naddress\npjlink://10.0.0.1\n"
+LIGHTS = """\
+yes
+camera
+from the left
+1
+5
+-1
+2
+45
+1024
+768
+address
+pjlink://10.0.0.1
+pjlink://10.0.0.2
+yes
+
+2 m
+
+
+
+
+
+none
+no
+"""
+
+
+def test_further_projectors_are_asked_for_and_each_slip_is_told_where_it_was_made(tmp_path):
+    text = changed("print\n", FIRST_THROWN).removesuffix("0\n") + LIGHTS + "0\n"
+    told, script = answered(tmp_path / "lab", text)
+    slips = ("another camera is called 'camera'", "at or behind the wall y_max", "its own address")
+    for slip, refused in zip(slips, script.refused, strict=True):
+        assert slip in refused
+    left, middle = told["light"]
+    assert (left["name"], left["camera_of"], left["url"]) == ("from the left", "camera", "pjlink://10.0.0.2")
+    assert (left["position"], left["angle_of_view"]) == (["1 m", "-1 m", "2 m"], "45 deg")
+    # What is not answered is as the first one's; where it is spoken to is its own.
+    assert (middle["name"], middle["position"]) == ("projector 3", ["2 m", "-1 m", "1.3 m"])
+    assert "url" not in middle
+    views = open_experiment(tmp_path / "lab").settings.scene.views
+    assert [(view.name, view.camera_of) for view in views] == [
+        ("camera", None),
+        ("from the left", "camera"),
+        ("projector 3", "camera"),
+    ]
+
+
+def test_a_further_projector_before_a_further_camera_is_that_cameras(tmp_path):
+    second = SECOND.replace("1\ncamera\n", "1\n", 1).replace("/dev/video0\n", "").replace("\n5\n", "\n")
+    further = "yes\nabove\n\n\n2.5\n\n\n\nnone\nno\n"
+    text = JET.removesuffix("0\n") + second.removesuffix("no\n") + further
+    told, script = answered(tmp_path / "lab", text)
+    assert script.refused == []
+    assert told["light"][0]["camera_of"] == "right"
+    views = open_experiment(tmp_path / "lab").settings.scene.views
+    assert [(view.name, view.wall, view.camera_of) for view in views[1:]] == [
+        ("right", "x_max", None),
+        ("above", "x_max", "right"),
+    ]
 
 
 def test_a_real_pipe_makes_the_experiment_and_a_wrong_line_says_its_number(tmp_path):
