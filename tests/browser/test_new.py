@@ -201,6 +201,66 @@ def test_a_room_that_was_not_entered_on_the_page_is_edited_and_keeps_what_is_not
     expect(page.locator("main")).not_to_contain_text("Not asked here")
 
 
+def test_a_further_projector_is_entered_beside_its_camera_and_stays_when_the_room_is_edited(
+    station: Station, opens: Opens
+):
+    hand = chosen(station, opens)
+    page = hand.page
+    add = page.get_by_role("button", name="Add a projector before camera", exact=True)
+    expect(add).to_have_count(0)
+    hand.click(page.get_by_role("radio", name="A projector shows the pattern"))
+    hand.click(add)
+    light = page.get_by_role("group", name="projector 2", exact=True)
+    light.get_by_label("Its lens, x").fill("3")
+    light.get_by_label("Its lens, y").fill("4")
+    expect(light).to_contain_text("y is 4 m, at or behind the wall y_max")
+    expect(page.locator("button.next")).to_have_text("1 to correct")
+    light.get_by_label("Its lens, y").fill("-1")
+    # Before another camera's print it could not be alone; it goes along with a camera that has another name.
+    hand.click(page.get_by_role("button", name="Add a camera"))
+    light.get_by_label("Before the camera").select_option("camera 2")
+    moved = page.get_by_role("group", name="camera 2").get_by_role("group", name="projector 2")
+    expect(moved).to_contain_text("a print hangs on x_max")
+    snapshot(page, "lights-before-a-print")
+    page.get_by_role("group", name="camera 2").get_by_label("What it is called").fill("aside")
+    page.get_by_role("group", name="camera 2").get_by_label("What it is called").blur()
+    moved = page.get_by_role("group", name="aside").get_by_role("group", name="projector 2")
+    expect(moved.get_by_label("Before the camera")).to_have_value("aside")
+    moved.get_by_label("Before the camera").select_option("camera")
+    hand.next_step("Create the experiment")
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+    folders = station.app.state.services.folders
+    (found,) = folders.all()
+    scene = folders.open(found.name).settings.scene
+    views, corner_m = scene.views, scene.room.lower_m
+    assert [(one.name, one.camera_of) for one in views] == [
+        ("camera", None),
+        ("aside", None),
+        ("projector 2", "camera"),
+    ]
+    placed_m = np.subtract(views[2].light.projector.position_m, corner_m)
+    np.testing.assert_allclose(placed_m, (3.0, -1.0, 1.3), atol=1e-9)
+    # It is read from the scene alone, where nobody had entered it.
+    (folders.folder(found.name) / "answers.toml").unlink()
+    page.get_by_role("button", name="Edit room").click()
+    expect(page.locator("main")).not_to_contain_text("Not asked here")
+    light.get_by_label("Its lens, z").fill("2.2")
+    light.get_by_label("Its address").fill("pjlink://10.0.0.2")
+    expect(page.locator("button.next")).to_have_text("Change the room")
+    snapshot(page, "lights-edited")
+    hand.next_step("Change the room")
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+    settings = folders.open(found.name).settings
+    placed_m = np.subtract(settings.scene.views[2].light.projector.position_m, corner_m)
+    np.testing.assert_allclose(placed_m, (3.0, -1.0, 2.2), atol=1e-9)
+    assert settings.rig.projectors["projector 2"].url == "pjlink://10.0.0.2"
+    page.get_by_role("button", name="Edit room").click()
+    page.get_by_role("button", name="Remove projector 2").click()
+    hand.next_step("Change the room")
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+    assert [one.name for one in folders.open(found.name).settings.scene.views] == ["camera", "aside"]
+
+
 def test_a_mistake_is_told_at_its_field_while_it_is_typed_and_can_be_undone(station: Station, opens: Opens):
     hand = chosen(station, opens)
     page = hand.page

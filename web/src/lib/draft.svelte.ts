@@ -6,7 +6,17 @@ import type { CheckResource } from "./schema";
 
 export type Path = (string | number)[];
 export type Tree = Record<string, unknown>;
-export const KINDS = ["supply", "outlet", "surface", "wall", "object", "thermometer", "anemometer", "view"] as const;
+export const KINDS = [
+  "supply",
+  "outlet",
+  "surface",
+  "wall",
+  "object",
+  "thermometer",
+  "anemometer",
+  "view",
+  "light",
+] as const;
 export type Kind = (typeof KINDS)[number];
 
 const KEPT = "answers";
