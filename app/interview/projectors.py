@@ -82,7 +82,11 @@ def _ask_address(tree: Tree, path: Path, inventory: Inventory, name: str) -> Ask
     devices = [port.device for port in inventory.ports]
     about = [port.description for port in inventory.ports]
     options = [NOTHING, "address", *devices]
-    told = ["it is switched by hand, or its address is not known yet", "its address on the network is known", *about]
+    told = [
+        "it is switched by hand, or its address is not known yet",
+        "its address on the network is known",
+        *about,
+    ]
     where = yield from ask_choice(f"{name}'s line, over which it is spoken to", options, NOTHING, told)
     if where in devices:
         found = inventory.who(where)
