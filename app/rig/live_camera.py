@@ -266,9 +266,16 @@ class LiveCamera:
             self._give_back(opened)
 
     def _give_back(self, opened: "_Opened") -> None:
-        """Show the camera as ready, with its settings, unless it was lost or left meanwhile."""
-        with contextlib.suppress(DeviceError, OSError):
+        """Show the camera as ready, with its settings, unless it was lost or left meanwhile.
+
+        A burst that loses its camera ends, and raises nothing: what is gone is found out here.
+        """
+        try:
             opened.status = self._status_of(opened.camera, self._status.experiment)
+        except DeviceNotFoundError as error:
+            self._fail(opened, error)
+        except (DeviceError, OSError) as error:
+            _log.warning("The camera does not tell its settings: %s", error)
         with self._guard:
             if self._opened is not opened or opened.ended:
                 return

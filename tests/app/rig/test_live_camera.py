@@ -1,5 +1,6 @@
 """The live camera: newest wins, one user at a time, and an unplugged camera is told, not hidden."""
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
@@ -10,7 +11,7 @@ import pytest
 from app.rig.frame_statistics import jpeg_of, statistics_of
 from app.rig.live_camera import CameraState, LiveCamera
 from drivers.errors import DeviceBusyError, DeviceNotFoundError, DeviceSettingError
-from drivers.protocols import Frame
+from drivers.protocols import CameraInfo, Frame
 from drivers.simulated import CameraFault, SimulatedCamera
 
 SCENE = np.tile(np.linspace(0.0, 0.9, 160, dtype=np.float32), (120, 1))
@@ -94,6 +95,32 @@ def test_an_unplugged_camera_is_told_with_what_to_do():
     until(lambda: camera.status.state is CameraState.failed)
     assert "unplugged" in camera.status.reason
     assert told[-1] == ("device", "failed")
+    camera.open("room", lambda: SimulatedCamera(lambda: SCENE, seed=1))
+    assert camera.status.state is CameraState.ready
+    camera.close()
+
+
+class Silent(SimulatedCamera):
+    """A camera that tells nothing once it is unplugged, as the kernel's do."""
+
+    @property
+    def info(self) -> CameraInfo:
+        if self._gone:
+            raise DeviceNotFoundError("It was unplugged.")
+        return super().info
+
+
+def test_a_camera_that_is_lost_in_a_burst_is_not_ready_for_the_next_one():
+    camera = LiveCamera(lambda kind, body: None)
+    camera.open(
+        "room", lambda: Silent(lambda: SCENE, seed=1, faults=lambda n: CameraFault.UNPLUG if n else None)
+    )
+    # The burst is incomplete, and says so itself: nothing is raised.
+    with camera.using() as inner, contextlib.suppress(DeviceNotFoundError):
+        inner.grab()
+        inner.follow()
+    assert camera.status.state is CameraState.failed
+    assert "unplugged" in camera.status.reason
     camera.open("room", lambda: SimulatedCamera(lambda: SCENE, seed=1))
     assert camera.status.state is CameraState.ready
     camera.close()

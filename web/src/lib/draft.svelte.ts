@@ -112,6 +112,8 @@ class Draft {
 
   /** Replaces all answers; `name` joins changes of one field. */
   put(next: Tree, name = ""): void {
+    // An empty list says nothing.
+    next = Object.fromEntries(Object.entries(next).filter(([, one]) => !(Array.isArray(one) && !one.length)));
     if (!name || name !== this.last) this.past = [...this.past.slice(-199), this.answers];
     [this.answers, this.future, this.last] = [next, [], name];
     this.later();
