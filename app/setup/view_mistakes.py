@@ -113,18 +113,14 @@ def _addresses(first: ProjectorAnswer | None, views: Views, lights: Lights) -> I
 def _behind(room_m: Vector3 | None, views: Views, lights: Lights) -> Iterator[Said]:
     """Cameras and projectors that stand at or behind the wall that they look at."""
     walls = _walls(views)
-    standing = [(item.name, path, item.wall, item.position) for path, item in views]
+    standing = [(path, item.wall, item.position) for path, item in views]
     standing += [
-        ("projector", (*path, "projector"), item.wall, item.projector.position)
-        for path, item in views
-        if item.projector
+        ((*path, "projector"), item.wall, item.projector.position) for path, item in views if item.projector
     ]
     standing += [
-        (item.name, path, walls[item.camera_of], item.position)
-        for path, item in lights
-        if item.camera_of in walls
+        (path, walls[item.camera_of], item.position) for path, item in lights if item.camera_of in walls
     ]
-    for name, path, wall, at in standing if room_m else ():
+    for path, wall, at in standing if room_m else ():
         face = face_of(wall)
         wall_m = (room_m or ())[face.axis] if face.upper else 0.0
         letter = "xyz"[face.axis]
@@ -132,5 +128,5 @@ def _behind(room_m: Vector3 | None, views: Views, lights: Lights) -> Iterator[Sa
             yield Said(
                 (*path, "position", face.axis),
                 f"{letter} is {at[face.axis]:g} m, at or behind the wall {wall} at {letter} = {wall_m:g} m. "
-                f"The {name} stands before it: give a {'smaller' if face.upper else 'larger'} {letter}.",
+                f"It stands before its wall: give a {'smaller' if face.upper else 'larger'} {letter}.",
             )

@@ -141,7 +141,8 @@ def offered(found: SecondLight | None) -> list[str]:
     return [
         f"A second projector at ({x:.1f}, {y:.1f}, {z:.1f}) m, on the other side of the camera, that lights the same "
         f"wall in turn would raise what the images fix to {100 * found.images:.0f} %; as many frames under the one "
-        f"that is there, to {100 * found.twice_the_frames:.0f} %. State it as a view with camera_of."
+        f"that is there, to {100 * found.twice_the_frames:.0f} %. State it as a further "
+        "projector (a view with camera_of)."
     ]
 
 
