@@ -24,7 +24,7 @@ def test_every_file_and_function_that_is_told_to_be_touched_exists():
     root = Path(app.__file__).parents[1]
     for path, name in re.findall(r"`((?:app|core)/[\w/.]+\.py)(?:: (\w+))?`", README):
         text = (root / path).read_text(encoding="utf-8")
-        assert not name or f"def {name}(" in text, f"{path}: {name}"
+        assert not name or re.search(rf"\b(?:def|class) {name}\b", text), f"{path}: {name}"
     for folder in re.findall(r"^\| `([^|]+)` \|", README, flags=re.MULTILINE):
         for name in re.findall(r"\w+", folder):
             assert (root / "app" / name / "__init__.py").is_file(), name
