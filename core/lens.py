@@ -19,17 +19,27 @@ def directions(
     k1, k2, p1, p2, k3 = distortion
     x, y = seen.T.copy()
     for _ in range(_STEPS if np.any(distortion) else 0):
+        ex, ey = _distorted(x, y, distortion) - seen.T
         r2 = x * x + y * y
         radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
         slope = 2 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))
-        ex = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) - seen[:, 0]
-        ey = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y - seen[:, 1]
         a = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
         b = x * y * slope + 2 * p1 * x + 2 * p2 * y
         d = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
         determinant = a * d - b * b
         x, y = x - (d * ex - b * ey) / determinant, y - (a * ey - b * ex) / determinant
     return np.stack([x, y, np.ones_like(x)], axis=1)
+
+
+def _distorted(
+    x: Float[np.ndarray, " points"], y: Float[np.ndarray, " points"], distortion: Float[np.ndarray, "5"]
+) -> Float[np.ndarray, "2 points"]:
+    """Brown-Conrady, OpenCV's order (k1, k2, p1, p2, k3), on the plane at distance 1."""
+    k1, k2, p1, p2, k3 = distortion
+    r2 = x * x + y * y
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    tangential = 2 * p1 * x * y + p2 * (r2 + 2 * x * x), p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+    return np.stack([x * radial + tangential[0], y * radial + tangential[1]])
 
 
 def on_plane(optics: Optics, pixels_px: Float[np.ndarray, "points 2"]) -> Float[np.ndarray, "points 2"]:
@@ -41,15 +51,5 @@ def on_plane(optics: Optics, pixels_px: Float[np.ndarray, "points 2"]) -> Float[
 
 def seen_at(optics: Optics, plane: Float[np.ndarray, "points 2"]) -> Float[np.ndarray, "points 2"]:
     """The pixels (column, row) of points of that plane: the inverse of `on_plane`."""
-    k1, k2, p1, p2, k3 = optics.distortion
-    x, y = plane.T
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    seen = np.stack(
-        [
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        ],
-        axis=1,
-    )
+    seen = _distorted(plane[:, 0], plane[:, 1], np.array(optics.distortion)).T
     return np.array(optics.principal_px) + np.array(optics.focal_px) * seen

@@ -28,15 +28,15 @@ Shifts = Float[np.ndarray, "windows 2"]
 def motion_basis(points_px: Float[np.ndarray, "points 2"], optics: Optics) -> Float[np.ndarray, "points 2 6"]:
     """Displacement of points (column, row) of a picture by a unit of each of the camera's six motions.
 
-    Sensor and lens are carried apart, to the right and down [px]; the lens's focal length grows [px at the picture's
-    edge]; the camera rolls [px at the edge], and turns to the side and up [px on the optical axis]. A picture that is
-    turned moves further at its edges than in its middle: by 1 + x^2 along x and x y along y, on the plane at
-    distance 1.
+    In order: the sensor is carried behind the lens, to the right and down [px]; the focal length grows [px at the
+    picture's edge]; the camera rolls [px at the edge], and turns sideways and up or down [px on the optical axis].
+    What a turn moves goes further at the picture's edges than in its middle: by 1 + x^2 along x and x y along y, on
+    the plane at distance 1 before the lens.
     """
     centre, half = np.array(optics.principal_px), max(optics.width_px, optics.height_px) / 2
-    plane, focal_px = on_plane(optics, points_px), np.array(optics.focal_px)
+    plane = on_plane(optics, points_px)
     x, y = plane.T
-    rolled = np.stack([-y, x], -1) / half * focal_px.mean()
+    rolled = np.stack([-y, x], -1) / half
     turned = np.stack([1.0 + x * x, x * y], -1), np.stack([x * y, 1.0 + y * y], -1)
     one, zero = np.ones_like(x), np.zeros_like(x)
 
@@ -48,8 +48,8 @@ def motion_basis(points_px: Float[np.ndarray, "points 2"], optics: Optics) -> Fl
         np.stack([one, zero], -1),
         np.stack([zero, one], -1),
         (points_px - centre) / half,
-        through_lens(rolled / focal_px.mean()),
-        *(through_lens(way / f) for way, f in zip(turned, focal_px, strict=True)),
+        through_lens(rolled),
+        *(through_lens(way / f) for way, f in zip(turned, optics.focal_px, strict=True)),
     ]
     return np.stack(columns, axis=-1)
 

@@ -50,7 +50,7 @@ class Agreement:
     drift_px: Motion
     middle_px: Float[np.ndarray, " 2"]
     typical_px: float
-    left: str
+    what_is_left: str
     agree: bool
 
     @property
@@ -60,7 +60,7 @@ class Agreement:
         if self.agree:
             return moved
         return (
-            f"{moved} That does not explain how they differ: {self.left}. "
+            f"{moved} That does not explain how they differ: {self.what_is_left}. "
             "The air was not still in one of them, or something moved. Wait longer before each, and take the series "
             "again."
         )
@@ -80,7 +80,11 @@ def agreement(before: Exposures, in_room: Mask) -> Agreement:
     basis = motion_basis(read.shift.centres_px[in_room], before.optics)
     typical_px = float(np.sqrt(np.mean(np.sum((basis @ read.motion_px) ** 2, axis=1))))
     return Agreement(
-        read.motion_px, _of_middle(read.motion_px, before.optics), typical_px, read.left, read.is_rigid
+        read.motion_px,
+        _of_middle(read.motion_px, before.optics),
+        typical_px,
+        read.what_is_left,
+        read.is_rigid,
     )
 
 
@@ -144,7 +148,9 @@ def _moved(middle_px: Float[np.ndarray, " 2"], motion_px: Motion) -> str:
 def _unknown(middle_px: Float[np.ndarray, " 2"], prior: MotionPrior, border: Rigid | None) -> str:
     why = "No part of the picture is free of the room's air."
     if border is not None:
-        why = f"The border of the picture is not still: {border.left}, so the room's air is before it."
+        why = (
+            f"The border of the picture is not still: {border.what_is_left}, so the room's air is before it."
+        )
     return (
         f"{why} The middle of the picture moved by {middle_px[0]:+.3f} px across, {middle_px[1]:+.3f} px down. How "
         f"much of that is the camera is not known exactly ({prior.source}), and is estimated together with the air."

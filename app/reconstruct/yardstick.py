@@ -98,10 +98,10 @@ class Rigid:
         return is_noise(self.unlike, self.windows) and self.by_chance > _LEAST_CHANCE
 
     @property
-    def left(self) -> str:
+    def what_is_left(self) -> str:
         """What the motion leaves, in words."""
         if is_noise(self.unlike, self.windows):
-            return "what a rigid motion leaves is alike in neighbouring windows, as air would do it"
+            return "what a rigid motion leaves moves neighbouring windows alike, as air does"
         return f"what a rigid motion leaves is {self.unlike**0.5:.1f} times its noise"
 
 
@@ -153,20 +153,20 @@ def _by_chance(
     terms = np.stack([x**i * y**j for i in range(powers + 1) for j in range(powers + 1 - i)], axis=-1)
     smooth = np.einsum("wt,ab->watb", terms, np.eye(2)).reshape(len(terms), 2, -1)
     weighted = [np.einsum("wab,wbp->wap", root, one).reshape(left.size, -1) for one in (rigid, smooth)]
-    both = np.linalg.svd(np.concatenate(weighted, axis=1), full_matrices=False)
-    of_rigid = np.linalg.svd(weighted[0], full_matrices=False)
-    (all_of_it, rank), (alone, few) = (_explained(left, *one) for one in (both, of_rigid))
-    rest = float(left @ left) - all_of_it
-    count, free = rank - few, left.size - rank
+    with_smooth, rank = _explained(left, np.concatenate(weighted, axis=1))
+    by_motion, few = _explained(left, weighted[0])
+    rest, count, free = float(left @ left) - with_smooth, rank - few, left.size - rank
     if count < 1 or free < 1 or rest <= 0.0:
         return 1.0
-    return float(special.fdtrc(count, free, (all_of_it - alone) / count / (rest / free)))
+    return float(special.fdtrc(count, free, (with_smooth - by_motion) / count / (rest / free)))
 
 
-def _explained(left: np.ndarray, u: np.ndarray, sizes: np.ndarray, _: np.ndarray) -> tuple[float, int]:
+def _explained(
+    left: Float[np.ndarray, " numbers"], basis: Float[np.ndarray, "numbers terms"]
+) -> tuple[float, int]:
     """Sum of squares that a basis explains, and its rank."""
-    rank = int((sizes > 1e-6 * sizes[0]).sum())
-    return float(np.sum((u[:, :rank].T @ left) ** 2)), rank
+    found, _, rank, _ = np.linalg.lstsq(basis, left, rcond=1e-6)
+    return float(left @ basis @ found), int(rank)
 
 
 def _smooth_count(powers: int) -> int:
@@ -244,7 +244,7 @@ def _why_not(part: Yardstick, good: Mask) -> str | None:
 def _not_still(read: Rigid) -> str | None:
     if read.is_rigid:
         return None
-    return f"{read.left}, so it is not still"
+    return f"{read.what_is_left}, so it is not still"
 
 
 def _odd_ones(exposures: Exposures, parts: list[Yardstick], prior: MotionPrior) -> list[Yardstick]:
@@ -259,6 +259,6 @@ def _odd_ones(exposures: Exposures, parts: list[Yardstick], prior: MotionPrior) 
 def _unlike_others(names: list[str], whole: Rigid) -> str:
     how, which = ("do not move alike", "one") if len(names) > 1 else ("do not move as the others do", "them")
     return (
-        f"The {' and '.join(names)} {how}: {whole.left}. "
+        f"The {' and '.join(names)} {how}: {whole.what_is_left}. "
         f"The room's air is before {which}, or somebody touched {which}."
     )
