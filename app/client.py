@@ -24,7 +24,7 @@ from app.api.models.answers import (
     PortResource,
     TemplateResource,
 )
-from app.api.models.calibrations import CalibrationResource, TogetherResource
+from app.api.models.calibrations import CalibrationResource
 from app.api.models.captures import CaptureResource, DeskResource, Role
 from app.api.models.devices import CameraResource
 from app.api.models.events import EventResource
@@ -39,6 +39,7 @@ from app.api.models.results import ComparisonResource, Form, PresetResource, Res
 from app.api.models.rigs import AddressesResource
 from app.api.models.screen import PatternName, ScreenResource
 from app.api.models.shift import ShiftResource
+from app.api.models.together import PlacesResource, TogetherResource
 from app.api.models.uploads import Upload
 from app.errors import AirlensError, BadInputError
 from app.experiment.plan import PlacesLine, Plan
@@ -262,6 +263,34 @@ class Client:
         """Adjust several calibrated views together, by what more than one of them saw."""
         path = f"/experiments/{experiment}/calibration/together"
         return self._ask(TogetherResource, "POST", path, {"tape_std_m": tape_std_m})
+
+    def places_together(self, experiment: str, places: int = 6) -> PlacesResource:
+        """Return which place of a board is wanted before several cameras, and what each found of the newest one."""
+        path = f"/experiments/{experiment}/calibration/together"
+        return self._ask(PlacesResource, "GET", path, query={"places": str(places)})
+
+    def take_place(self, experiment: str, **how: Any) -> PlacesResource:
+        """Take pictures of a board by all cameras at once; `how` are the fields of PlacesRequest."""
+        path = f"/experiments/{experiment}/calibration/together/places"
+        return self._ask(PlacesResource, "POST", path, how)
+
+    def retake_place(self, experiment: str, place: str) -> PlacesResource:
+        """Forget a place of the board."""
+        path = f"/experiments/{experiment}/calibration/together/places/{place}"
+        return self._ask(PlacesResource, "DELETE", path)
+
+    def skip_place(self, experiment: str, places: int = 6) -> PlacesResource:
+        """Do with one place less."""
+        path = f"/experiments/{experiment}/calibration/together/skip"
+        return self._ask(PlacesResource, "POST", path, {"places": places})
+
+    def stop_place(self, experiment: str) -> PlacesResource:
+        """Stop taking pictures; the places that were taken are kept."""
+        return self._ask(PlacesResource, "POST", f"/experiments/{experiment}/calibration/together/stop")
+
+    def discard_places(self, experiment: str) -> PlacesResource:
+        """Forget all places; the calibration in use stays."""
+        return self._ask(PlacesResource, "DELETE", f"/experiments/{experiment}/calibration/together")
 
     def plan(self, experiment: str) -> Plan:
         """Return the newest plan; a job of kind `plan` makes one."""

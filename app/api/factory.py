@@ -25,6 +25,7 @@ from app.api.resources import (
     results,
     screen,
     shift,
+    together,
     uploads,
 )
 from app.api.security import session
@@ -48,6 +49,7 @@ RESOURCES: tuple[APIRouter, ...] = (
     answers.router,
     calibrations.router,
     guide.router,
+    together.router,
     live.router,
     captures.router,
     plans.router,

@@ -14,6 +14,7 @@ from app.api.wire.curves import CurveCache
 from app.api.wire.feed import EventFeed
 from app.api.wire.volumes import SolutionCache
 from app.calibrate.service import CalibrationDesk
+from app.calibrate.together_service import TogetherDesk
 from app.capture.service import CaptureDesk
 from app.files.uploads.store import UploadLimits, UploadStore
 from app.jobs import Ledger
@@ -43,6 +44,7 @@ class Services:
     desk: CaptureDesk
     beside: LiveAir
     guide: CalibrationDesk
+    together: TogetherDesk
     screen: KioskScreen
     projector: LiveProjector
 
@@ -68,6 +70,7 @@ def create_services(config: ServiceConfig) -> Services:
     projector = LiveProjector(news.tell)
     beside = LiveAir(news.tell)
     screen = KioskScreen()
+    guide = CalibrationDesk(cameras, screen, news.tell, projector)
     return Services(
         config,
         Access(config),
@@ -81,7 +84,8 @@ def create_services(config: ServiceConfig) -> Services:
         cameras,
         CaptureDesk(cameras, news.tell, beside=beside, projector=projector),
         beside,
-        CalibrationDesk(cameras, screen, news.tell, projector),
+        guide,
+        TogetherDesk(cameras, guide, news.tell),
         screen,
         projector,
     )

@@ -175,10 +175,13 @@ class CalibrationFolder:
         with reading(self._shared_path, "Remove it and take the boards again."):
             return shared_from_json(self._shared_path.read_text(encoding="utf-8"), str(self._shared_path))
 
-    def save_shared(self, record: SharedRecord) -> None:
-        """Keep the boards that several cameras saw."""
+    def change_shared(self, change: Callable[[SharedRecord], SharedRecord]) -> SharedRecord:
+        """Keep `change(what several cameras saw so far)`, durably; nobody else changes it in between."""
         make_folder(self.folder)
-        write_text(self._shared_path, shared_to_json(record))
+        with locked(self.folder):
+            record = change(self.shared())
+            write_text(self._shared_path, shared_to_json(record))
+        return record
 
     def forget_shared(self) -> None:
         """Forget those boards, with their live pictures; the calibration in use stays."""

@@ -25,6 +25,7 @@ from app.rig.live_projector import LiveProjector
 from app.rig.open import open_camera, open_stage, panel_of
 from app.rig.stage import RealStage, Stage, StageTask, UnopenedStage
 from app.states import StateMachine
+from calibration.board import Board
 from drivers.display import PatternDisplay
 from drivers.errors import DeviceBusyError, DeviceError
 
@@ -62,16 +63,23 @@ GUIDE = StateMachine(
 
 
 @dataclass(eq=False)
-class _Run:
+class Run:
     """Pictures that are being taken."""
 
     abort: threading.Event = field(default_factory=threading.Event)
     thread: threading.Thread | None = None
 
 
+# Takes pictures until it is told to stop, and returns what is wrong with them.
+Work = Callable[[Run], tuple[str, ...]]
+
+
 @dataclass(frozen=True)
 class GuideStatus:
-    """What is being taken, or was last: `done` of `total` pictures; `issues` of the newest ones."""
+    """What is being taken, or was last: `done` of `total` pictures; `issues` of the newest ones.
+
+    Without a `step` it is a board before several cameras.
+    """
 
     state: GuideState = GuideState.idle
     experiment: str | None = None
@@ -103,7 +111,7 @@ class CalibrationDesk:
         self._status = GuideStatus()
         self._skipped: dict[tuple[str, StepName, str], tuple[StageTask, ...]] = {}
         self._lock = threading.Lock()
-        self._now: _Run | None = None
+        self._now: Run | None = None
 
     @property
     def status(self) -> GuideStatus:
@@ -117,28 +125,40 @@ class CalibrationDesk:
     def take(self, experiment: Experiment, plan: LivePlan, told: Conditions) -> GuideStatus:
         """Begin with what is wanted and return at once. Raises DeviceBusyError, BadInputError."""
         with self._lock:
-            state = GUIDE.after(self._status.state, GuideEvent.take)
-            task = self.wanted(experiment, plan)
-            run = _Run()
-            work = (run, experiment, plan, told)
-            run.thread = threading.Thread(target=self._run, args=work, name="calibration", daemon=True)
-            self._now = run
-            before, self._status = (
-                self._status,
-                GuideStatus(state, experiment.folder.name, plan.step, plan.camera, task),
+            self.free()
+            begun = GuideStatus(
+                experiment=experiment.folder.name,
+                step=plan.step,
+                camera=plan.camera,
+                wanted=self.wanted(experiment, plan),
             )
-            try:
-                run.thread.start()
-            except RuntimeError:  # no more threads
-                self._now, self._status = None, before
-                raise
+            self._begin(begun, lambda run: self._take(run, experiment, plan, told))
         self._tell_status()
         return self._status
+
+    def run(self, begun: GuideStatus, work: Work) -> GuideStatus:
+        """Begin with other pictures, of which `work` returns what is wrong with them. Raises DeviceBusyError."""
+        with self._lock:
+            self._begin(begun, work)
+        self._tell_status()
+        return self._status
+
+    def _begin(self, begun: GuideStatus, work: Work) -> None:
+        state = GUIDE.after(self._status.state, GuideEvent.take)
+        run = Run()
+        run.thread = threading.Thread(target=self._run, args=(run, work), name="calibration", daemon=True)
+        self._now = run
+        before, self._status = self._status, replace(begun, state=state)
+        try:
+            run.thread.start()
+        except RuntimeError:  # no more threads
+            self._now, self._status = None, before
+            raise
 
     def skip(self, experiment: Experiment, plan: LivePlan) -> StageTask | None:
         """Do without what is wanted until the service is started anew; return what is wanted then."""
         with self._lock:
-            self._free()
+            self.free()
             guided = self._asked(experiment, plan)
             guided.skip()
             self._skipped[experiment.folder.name, plan.step, plan.camera] = guided.skipped
@@ -148,14 +168,14 @@ class CalibrationDesk:
     def retake(self, experiment: Experiment, plan: LivePlan, view: str) -> None:
         """Forget a view. Raises BadInputError when there is none of that name, DeviceBusyError."""
         with self._lock:
-            self._free()
+            self.free()
             self._asked(experiment, plan).retake(view)
             self._tell("calibration", {"experiment": experiment.folder.name, "state": "retake", "view": view})
 
     def discard(self, experiment: Experiment, plan: LivePlan) -> None:
         """Forget what a step has taken and not completed. Raises DeviceBusyError."""
         with self._lock:
-            self._free()
+            self.free()
             name = experiment.folder.name
             CalibrationFolder(experiment.folder).discard(plan.step, plan.camera)
             self._skipped.pop((name, plan.step, plan.camera), None)
@@ -180,7 +200,8 @@ class CalibrationDesk:
         """Stop."""
         self.stop()
 
-    def _free(self) -> None:
+    def free(self) -> None:
+        """Refuse while pictures are taken. Raises DeviceBusyError."""
         GUIDE.after(self._status.state, GuideEvent.take)
 
     def _asked(self, experiment: Experiment, plan: LivePlan) -> GuidedCalibration:
@@ -193,20 +214,20 @@ class CalibrationDesk:
         skipped = self._skipped.get((experiment.folder.name, plan.step, plan.camera), ())
         return GuidedCalibration(CalibrationFolder(experiment.folder), plan, stage, skipped)
 
-    def _run(self, run: "_Run", experiment: Experiment, plan: LivePlan, told: Conditions) -> None:
+    def _run(self, run: "Run", work: Work) -> None:
         try:
-            issues = self._take(run, experiment, plan, told)
+            issues = work(run)
         except CalibrationStoppedError as stop:
             self._end(run, GuideEvent.end, reason=str(stop))
         except (AirlensError, DeviceError, OSError) as error:
             self._end(run, GuideEvent.fail, reason=str(error))
         except Exception as error:
-            _log.exception("calibration of %s", experiment.folder.name)
+            _log.exception("calibration of %s", self._status.experiment)
             self._end(run, GuideEvent.fail, reason=f"{type(error).__name__}: {error}. This is a defect.")
         else:
             self._end(run, GuideEvent.end, issues=issues)
 
-    def _take(self, run: "_Run", experiment: Experiment, plan: LivePlan, told: Conditions) -> tuple[str, ...]:
+    def _take(self, run: "Run", experiment: Experiment, plan: LivePlan, told: Conditions) -> tuple[str, ...]:
         with self._stage(experiment, plan) as stage:
             guided = self._guided(experiment, plan, stage)
             guided.resume()
@@ -219,24 +240,17 @@ class CalibrationDesk:
     @contextmanager
     def _stage(self, experiment: Experiment, plan: LivePlan) -> Iterator[Stage]:
         """The rig, its camera also shown to whoever looks."""
-        name, view = experiment.folder.name, view_number(experiment, plan.camera)
-        eye = opened_for(experiment, view)
-        live = self._live.of(eye)
-        if experiment.settings.rig.camera_kind == "simulated":
-            stage = open_stage(experiment, plan.board, view=view)
-            self._live.open(name, view, lambda: stage.camera, "practice")
-            with live.using():
-                yield stage
-            return
-        if live.status.experiment != name or live.status.state.value != "ready":
-            self._live.open(name, eye, lambda: open_camera(experiment, "still", view))
+        view = view_number(experiment, plan.camera)
         panel = panel_of(experiment.settings.scene, view)
         if panel is not None:
             lamps_beside(experiment, self._projector).light(view)
-        with live.using() as camera:
-            yield RealStage(camera, None if panel is None else self._screen, panel)
+        with shown_stage(self._live, experiment, plan.board, view) as stage:
+            if not isinstance(stage, RealStage):
+                yield stage
+                return
+            yield replace(stage, display=None if panel is None else self._screen, panel_px=panel)
 
-    def _progress(self, run: "_Run", done: int, total: int) -> None:
+    def _progress(self, run: "Run", done: int, total: int) -> None:
         with self._lock:
             if self._now is not run:
                 return
@@ -246,7 +260,7 @@ class CalibrationDesk:
             self._tell_status()
 
     def _end(
-        self, run: "_Run", event: GuideEvent, *, issues: tuple[str, ...] | None = None, reason: str = ""
+        self, run: "Run", event: GuideEvent, *, issues: tuple[str, ...] | None = None, reason: str = ""
     ) -> None:
         """Leave the running state, once."""
         with self._lock:
@@ -263,3 +277,20 @@ class CalibrationDesk:
         names = ("experiment", "done", "total", "reason")
         body = {"state": status.state.value, "step": status.step and status.step.value}
         self._tell("calibration", body | {name: getattr(status, name) for name in names})
+
+
+@contextmanager
+def shown_stage(live: LiveCameras, experiment: Experiment, board: Board | None, view: int) -> Iterator[Stage]:
+    """The rig of a view, its camera also shown to whoever looks. Raises BadInputError, DeviceError."""
+    name, eye = experiment.folder.name, opened_for(experiment, view)
+    seen = live.of(eye)
+    if experiment.settings.rig.camera_kind == "simulated":
+        stage = open_stage(experiment, board, view=view)
+        live.open(name, view, lambda: stage.camera, "practice")
+        with seen.using():
+            yield stage
+        return
+    if seen.status.experiment != name or seen.status.state.value != "ready":
+        live.open(name, eye, lambda: open_camera(experiment, "still", view))
+    with seen.using() as camera:
+        yield RealStage(camera)

@@ -21,7 +21,7 @@ from app.files.image_folder import find_images, read_grey
 from calibration.board import Board
 from calibration.bundle import CalibratedOptics, Joint
 from calibration.errors import CalibrationError
-from calibration.record import SeenBoard, seen_board
+from calibration.record import Record, SeenBoard, seen_board
 from calibration.shared import SharedBoard
 from calibration.tie import NothingSharedError, Seat, groups
 from calibration.together import Stated, Together, adjust_together
@@ -79,30 +79,49 @@ def seats_of(calibration: CalibrationFolder) -> tuple[tuple[Seat, ...], tuple[st
     Views lit by a projector that is stated at the same place have the same projector.
     """
     scene = open_experiment(calibration.experiment).settings.scene
-    if len(scene.views) < 2:
-        raise BadInputError(
-            "This experiment has one view; expected two or more. State a further one under [[view]]."
-        )
-    seats, without = [], []
+    records, without = records_of(calibration)
+    seats = []
     for view in scene.views:
-        if view.camera_of is not None:
-            continue  # its projector goes where that camera goes
-        record, light = calibration.record(view.name), view.light or scene.light
+        record, light = records.get(view.name), view.light or scene.light
         if record is None:
-            without.append(view.name)
             continue
         lamp = repr(light.projector) if isinstance(light, ProjectedPattern) else ""
         try:
             seats.append(Seat(model_of(record), lamp))
         except CalibrationError as error:
             raise BadInputError(f"{view.name!r}: {error}") from error
-    if len(seats) < 2:
+    return tuple(seats), without
+
+
+def records_of(calibration: CalibrationFolder) -> tuple[dict[str, Record], tuple[str, ...]]:
+    """What the calibrated cameras saw, by their views, and the names of the views that have no calibrated camera.
+
+    Raises BadInputError where fewer than two are calibrated from pictures.
+    """
+    experiment = open_experiment(calibration.experiment)
+    names = [view_names(experiment)[number] for number in own_cameras(experiment)]
+    if len(names) < 2:
+        raise BadInputError(
+            "This experiment has one camera; expected two or more. State a further one under [[view]]."
+        )
+    found = {name: calibration.record(name) for name in names}
+    records = {name: record for name, record in found.items() if record is not None}
+    without = tuple(name for name in names if name not in records)
+    if len(records) < 2:
         named = ", ".join(map(repr, without))
         raise BadInputError(
             f"{named} {'has' if len(without) == 1 else 'have'} no camera calibrated from pictures; expected two "
-            "views that have. Run airlens calibrate camera, then wall, with --view NAME for each."
+            "views that have. Take the steps camera, then wall, of each (airlens calibrate, with --view NAME)."
         )
-    return tuple(seats), tuple(without)
+    return records, without
+
+
+@dataclass(frozen=True)
+class Added:
+    """What pictures of several cameras showed: the boards by their place and camera, and what is wrong."""
+
+    seen: dict[str, dict[str, SeenBoard]]
+    issues: tuple[str, ...]
 
 
 def add_pictures(
@@ -112,10 +131,10 @@ def add_pictures(
     full_scale: int | None,
     say: OnEvent,
     pattern: str = "*",
-) -> tuple[str, ...]:
+) -> Added:
     """Look for the board in pictures of several cameras, and keep the places that two or more saw.
 
-    Returns what is wrong with the pictures. Raises BadInputError where no two cameras have a picture in common.
+    Raises BadInputError where no two cameras have a folder of pictures.
     """
     experiment = open_experiment(calibration.experiment)
     names = [view_names(experiment)[number] for number in own_cameras(experiment)]
@@ -128,6 +147,8 @@ def add_pictures(
     seen: dict[str, dict[str, SeenBoard]] = {}
     issues: list[str] = []
     for name, own in folders.items():
+        if pattern != "*" and not any(own.glob(pattern)):
+            continue  # a camera that failed has told so
         for file in find_images(own, pattern):
             told = f"{in_a_name(name)}/{file.name}"
             say(told)
@@ -148,18 +169,16 @@ def add_pictures(
             if view.usable:
                 seen.setdefault(file.stem, {})[name] = seen_board(view, digest(image))
     boards = tuple(SharedBoard(place, both) for place, both in seen.items() if len(both) > 1)
-    calibration.save_shared(calibration.shared().with_boards(boards))
+    calibration.change_shared(lambda record: record.with_boards(boards))
     alone = [f"{place} by {next(iter(both))!r}" for place, both in seen.items() if len(both) == 1]
     if alone:
         issues.append(f"Seen by one camera only, so of no use here: {', '.join(alone)}.")
-    return tuple(issues)
+    return Added(seen, tuple(issues))
 
 
 def summary(outcome: TogetherOutcome) -> dict[str, Any]:
     """The outcome as JSON values."""
     found = outcome.together
-    cameras = list(found.views)
-    pairs = [(a, b) for n, a in enumerate(cameras) for b in cameras[n + 1 :]]
     return {
         "views": {
             name: {
@@ -169,14 +188,18 @@ def summary(outcome: TogetherOutcome) -> dict[str, Any]:
             }
             for name, view in found.views.items()
         },
-        "pairs": [
-            relative(found.joint, found.views[a].camera, found.views[b].camera) | {"views": [a, b]}
-            for a, b in pairs
-        ],
+        "pairs": pairs_of(found.joint, {name: view.camera for name, view in found.views.items()}),
         "boards": found.joint.boards,
         "rms_px": found.joint.rms_px,
         "issues": list(outcome.issues),
     }
+
+
+def pairs_of(joint: Joint, cameras: dict[str, CalibratedOptics]) -> list[dict[str, Any]]:
+    """How every two of the cameras stand to one another, as JSON values."""
+    names = list(cameras)
+    pairs = [(a, b) for n, a in enumerate(names) for b in names[n + 1 :]]
+    return [relative(joint, cameras[a], cameras[b]) | {"views": [a, b]} for a, b in pairs]
 
 
 def lines(content: dict[str, Any]) -> list[str]:

@@ -7,17 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.calibrate.folder import CalibrationFolder, in_a_name
-from app.calibrate.pictures import Shooter
+from app.calibrate.pictures import CalibrationStoppedError, Shooter
 from app.calibrate.together import add_pictures
-from app.errors import BadInputError
+from app.errors import AirlensError, BadInputError
 from app.experiment.folder import Experiment, open_experiment
 from app.experiment.views import own_cameras, view_names
 from app.rig.open import open_stage
 from app.rig.stage import HeldBoard, Stage, StageTask, board_size_m
 from calibration.board import Board
 from calibration.common_places import common_places
+from calibration.record import SeenBoard
 from core.geometry import rotation_vector
 from drivers.capture import Abort
+from drivers.errors import DeviceError
 
 # Three places fix two cameras; twice as many show one that does not fit.
 PLACES = 6
@@ -33,15 +35,23 @@ class TogetherPlan:
 
 
 class TogetherSession:
-    """The cameras of all views, open. `wanted` says what to arrange; `take` takes the pictures of it."""
+    """The cameras of all views, open. `wanted` says what to arrange; `take` takes the pictures of it.
+
+    `newest` is what the cameras that found the board saw in the pictures that were taken last.
+    """
 
     def __init__(
-        self, calibration: CalibrationFolder, plan: TogetherPlan, stages: Mapping[str, Stage]
+        self,
+        calibration: CalibrationFolder,
+        plan: TogetherPlan,
+        stages: Mapping[str, Stage],
+        skipped: int = 0,
     ) -> None:
         self._calibration, self._plan, self._stages = calibration, plan, dict(stages)
         scene = open_experiment(calibration.experiment).settings.scene
         self._held: list[HeldBoard] = []
-        self._skipped = 0
+        self._skipped = skipped
+        self.newest: dict[str, SeenBoard] = {}
         if self.arranges_itself:
             cameras = tuple(view.camera for view in scene.views if view.camera_of is None)
             # More than are wanted: one in which the board is not found is passed over.
@@ -83,19 +93,20 @@ class TogetherSession:
 
     def retake(self, name: str) -> None:
         """Forget a place and its pictures. Raises BadInputError when there is none of that name."""
-        record = self._calibration.shared()
-        pictures = list(self._calibration.live_together.glob(f"*/{name}.*"))
-        if not pictures and name not in [board.name for board in record.boards]:
-            known = ", ".join(board.name for board in record.boards) or "none"
-            raise BadInputError(f"There is no place {name!r}; known are: {known}.")
-        self._calibration.save_shared(record.without(name))
+        known = [board.name for board in self._calibration.shared().boards]
+        folders = self._calibration.live_together.glob("*")
+        pictures = [file for one in folders for file in one.iterdir() if file.stem == name]
+        if not pictures and name not in known:
+            raise BadInputError(f"There is no place {name!r}; known are: {', '.join(known) or 'none'}.")
+        self._calibration.change_shared(lambda record: record.without(name))
         for picture in pictures:
             picture.unlink(missing_ok=True)
 
     def take(self, abort: Abort | None = None) -> tuple[str, ...]:
         """A picture by each camera at the same time; returns what is wrong with them.
 
-        Raises CalibrationStoppedError, AirlensError, DeviceError; pictures taken before that are kept.
+        A camera that fails is named; where two others took theirs, these count. Raises CalibrationStoppedError,
+        AirlensError; pictures taken before that are kept.
         """
         task = self.wanted()
         if task is None:
@@ -111,9 +122,17 @@ class TogetherSession:
                 )
                 for view, stage in self._stages.items()
             ]
-        for one in under_way:
-            one.result()
-        return self._used(folder, name)
+        failed = []
+        for view, one in zip(self._stages, under_way, strict=True):
+            try:
+                one.result()
+            except CalibrationStoppedError:
+                raise
+            except (AirlensError, DeviceError) as error:
+                failed.append(f"The camera of {view!r}: {error}")
+        if len(self._stages) - len(failed) < 2:
+            raise AirlensError(f"{' '.join(failed)} This place counts for nothing; take it again.")
+        return (*failed, *self._used(folder, name))
 
     def resume(self) -> tuple[str, ...]:
         """Use pictures that an earlier session took and did not come to use."""
@@ -123,9 +142,11 @@ class TogetherSession:
 
     def _used(self, folder: Path, name: str) -> tuple[str, ...]:
         full_scale = min(2**stage.camera.info.bits - 1 for stage in self._stages.values())
-        return add_pictures(
+        added = add_pictures(
             self._calibration, folder, self._plan.board, full_scale, lambda told: None, f"{name}.*"
         )
+        self.newest = added.seen.get(name, {})
+        return added.issues
 
     def _next(self) -> int:
         """One more than the largest number of a place that was pictured."""

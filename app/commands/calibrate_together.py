@@ -82,7 +82,7 @@ def together(
             plan = TogetherPlan(target, frames, places)
             issues = run_together(folder, plan, LiveOptions(every_s, retake=tuple(retake or ())))
         else:
-            issues = add_pictures(folder, images, target, full_scale(bits), _say)
+            issues = add_pictures(folder, images, target, full_scale(bits), _say).issues
     content = summary(adjusted(folder, stated, issues))
     typer.echo(json.dumps(content, indent=1) if as_json else "\n".join(lines(content)))
 

@@ -5,19 +5,21 @@ of views: the errors of T and u, how many points the 95 % intervals hold, and th
 of the best sum of fields that each do not vary along one of the views: what means along parallel lines, without
 noise, leave to whoever knows nothing else.
 
-    python -m tests.benchmarks.views TRUTH.npz [--camera-px 1024] [--frames 60] [--preset draft] [--seed 0]
+    python -m tests.benchmarks.views TRUTH.npz ... [--camera-px 1024] [--frames 60] [--preset draft] [--world lab]
+        [--seed 0] [--seeds 20]    # as many, from that one on; each seed with all rooms before the next one
 """
 
 import argparse
 import json
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from app.experiment.rig_settings import SimulatedCameraSettings
 from app.pipeline import reconstruct
 from app.simulate.experiment import simulate
+from app.simulate.worlds import WORLDS
 from app.volume.file import RoomVolume, read_volume
 from app.volume.scene import RIG_PLACES, RigOptions
 from app.volume.score import score_experiment
@@ -25,7 +27,6 @@ from core.geometry import WallName
 
 SETS: tuple[tuple[WallName, ...], ...] = (
     ("y_max",),
-    ("x_max",),
     ("y_max", "x_max"),
     ("y_max", "x_max", "z_max"),
 )
@@ -47,53 +48,58 @@ def line_means_k(truth: RoomVolume, walls: tuple[WallName, ...]) -> float:
 def main() -> None:
     """Print the lines."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("truth", type=Path)
+    parser.add_argument("truth", type=Path, nargs="+")
     parser.add_argument("--camera-px", type=int, default=1024)
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--preset", default="draft")
     parser.add_argument("--information", default="operator")
     parser.add_argument("--rig", default="lab", choices=RIG_PLACES)
+    parser.add_argument("--world", default="ideal", choices=tuple(WORLDS))
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seeds", type=int, default=1)
     asked = parser.parse_args()
+    for seed in range(asked.seed, asked.seed + asked.seeds):
+        for truth in asked.truth:
+            for walls in SETS:
+                print(json.dumps(row(asked, truth, seed, walls)), flush=True)
+
+
+def row(asked: argparse.Namespace, truth: Path, seed: int, walls: tuple[WallName, ...]) -> dict[str, Any]:
+    """One experiment."""
     stand_off_m, baseline_m = RIG_PLACES[asked.rig]
-    for walls in SETS:
-        options = RigOptions(
-            camera_px=(asked.camera_px, asked.camera_px * 3 // 4),
-            frames=asked.frames,
-            stand_off_m=stand_off_m,
-            baseline_m=baseline_m,
-            pattern_seed=asked.seed,
-            walls=walls,
-        )
-        with tempfile.TemporaryDirectory() as made:
-            folder = Path(made) / "room"
-            camera = SimulatedCameraSettings(seed=asked.seed)
-            simulate(asked.truth, folder, options, asked.information, camera)
-            done = reconstruct(folder, asked.preset)
-            scores = score_experiment(folder, asked.truth)
-        print(
-            json.dumps(
-                {
-                    "room": asked.truth.stem,
-                    "views": walls,
-                    "preset": asked.preset,
-                    "information": asked.information,
-                    "rig": asked.rig,
-                    "camera_px": asked.camera_px,
-                    "frames": asked.frames,
-                    "seed": asked.seed,
-                    "T_rms_K": scores["T"]["rms_K"],
-                    "line_means_K": line_means_k(read_volume(asked.truth), walls),
-                    "T_departure": scores["T"]["rel_departure"],
-                    "T_within": scores["T_within"],
-                    "u": None if scores["u"] is None else scores["u"]["rel"],
-                    "u_within": scores["u_within"],
-                    "solver_s": round(scores["solver_s"], 1),
-                    "wall_s": round(done.wall_s, 1),
-                }
-            ),
-            flush=True,
-        )
+    options = RigOptions(
+        camera_px=(asked.camera_px, asked.camera_px * 3 // 4),
+        frames=asked.frames,
+        stand_off_m=stand_off_m,
+        baseline_m=baseline_m,
+        pattern_seed=seed,
+        walls=walls,
+    )
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made) / "room"
+        world = WORLDS[asked.world]
+        simulate(truth, folder, options, asked.information, world.camera(seed), misreads=world.misreads)
+        done = reconstruct(folder, asked.preset)
+        scores = score_experiment(folder, truth)
+    return {
+        "room": truth.stem,
+        "views": walls,
+        "preset": asked.preset,
+        "information": asked.information,
+        "rig": asked.rig,
+        "world": asked.world,
+        "camera_px": asked.camera_px,
+        "frames": asked.frames,
+        "seed": seed,
+        "T_rms_K": scores["T"]["rms_K"],
+        "line_means_K": line_means_k(read_volume(truth), walls),
+        "T_departure": scores["T"]["rel_departure"],
+        "T_within": scores["T_within"],
+        "u": None if scores["u"] is None else scores["u"]["rel"],
+        "u_within": scores["u_within"],
+        "solver_s": round(scores["solver_s"], 1),
+        "wall_s": round(done.wall_s, 1),
+    }
 
 
 if __name__ == "__main__":

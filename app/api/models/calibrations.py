@@ -2,8 +2,6 @@
 
 from typing import Literal
 
-from pydantic import Field
-
 from app.api.models.strict import WireModel
 
 
@@ -42,29 +40,3 @@ class NewCalibration(WireModel):
     """A simulated rig takes its models from its scene; a real one is calibrated on the command line."""
 
     kind: Literal["simulated"]
-
-
-class NewTogether(WireModel):
-    """Views to be adjusted together by what is there; `tape_std_m` is how well places were measured by tape."""
-
-    tape_std_m: float = Field(default=0.005, ge=1e-6, le=1.0)
-
-
-class PairResource(WireModel):
-    """How far apart two views' cameras stand and how they are turned, each with its standard deviation."""
-
-    views: list[str]
-    apart_m: float
-    apart_std_m: float
-    turned_deg: float
-    turned_std_deg: float
-
-
-class TogetherResource(WireModel):
-    """What came of an adjustment: the pairs, how many boards several cameras saw, and what to mind."""
-
-    pairs: list[PairResource]
-    boards: int
-    rms_px: float
-    issues: list[str]
-    calibration: CalibrationResource

@@ -8,21 +8,16 @@ from app.api.models.calibrations import (
     CalibrationItem,
     CalibrationResource,
     NewCalibration,
-    NewTogether,
-    PairResource,
     StandingResource,
-    TogetherResource,
 )
 from app.api.services import Given
 from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
-from app.calibrate.folder import CalibrationFolder, StepName
+from app.calibrate.folder import StepName
 from app.calibrate.parts import Part, bundle_of, is_calibrated, parts_of, ties_of
-from app.calibrate.together import summary, together
 from app.experiment.folder import Experiment
 from app.simulate.rehearsal import calibrate_simulated
 from calibration.bundle import Bundle, CalibratedOptics
-from calibration.together import Stated
 from core.geometry import Optics, face_of
 from core.scene import Scene, View
 
@@ -40,7 +35,7 @@ _WITHOUT = {
 @router.get("/experiments/{experiment}/calibration")
 def read_calibration(given: Given, experiment: Identifier) -> CalibrationResource:
     """Return the calibration in use; of a rig that nobody has calibrated, that everything is missing."""
-    return _resource(given.folders.open(experiment))
+    return calibration_resource(given.folders.open(experiment))
 
 
 @router.post("/experiments/{experiment}/calibration", status_code=201)
@@ -53,25 +48,11 @@ def calibrate(given: Given, experiment: Identifier, new: NewCalibration) -> Cali
         )
     calibrate_simulated(found)
     given.ledger.append_event("experiment", {"experiment": experiment, "calibrated": True})
-    return _resource(found)
+    return calibration_resource(found)
 
 
-@router.post("/experiments/{experiment}/calibration/together", status_code=201)
-def calibrate_together(given: Given, experiment: Identifier, new: NewTogether) -> TogetherResource:
-    """Adjust the calibrated views together, by boards that several cameras saw and a projector that they share."""
-    found = given.folders.open(experiment)
-    told = summary(together(CalibrationFolder(found.folder), Stated(tape_std_m=new.tape_std_m)))
-    given.ledger.append_event("experiment", {"experiment": experiment, "calibrated": True})
-    return TogetherResource(
-        pairs=[PairResource.model_validate(pair) for pair in told["pairs"]],
-        boards=told["boards"],
-        rms_px=told["rms_px"],
-        issues=told["issues"],
-        calibration=_resource(found),
-    )
-
-
-def _resource(experiment: Experiment) -> CalibrationResource:
+def calibration_resource(experiment: Experiment) -> CalibrationResource:
+    """What is known of an experiment's rig, with what is missing. Raises BadInputError."""
     bundle, parts = bundle_of(experiment), parts_of(experiment)
     room, scene = experiment.settings.scene.room, experiment.settings.scene
     views = [(view, bundle.of(view.name, number == 0)) for number, view in enumerate(scene.views)]
