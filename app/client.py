@@ -158,22 +158,25 @@ class Client:
         """List what went over the projector's line after a moment (Unix time)."""
         return self._ask(list[WireLine], "GET", "/devices/projector/wire", query={"after_s": str(after_s)})
 
-    def screen(self) -> ScreenResource:
-        """Return what the kiosk page shows."""
-        return self._ask(ScreenResource, "GET", "/devices/screen")
+    def screen(self, view: int = 0) -> ScreenResource:
+        """Return what the kiosk page of a projector shows, by the number of the first view that sees by it."""
+        return self._ask(ScreenResource, "GET", "/devices/screen", query={"view": str(view)})
 
-    def show_pattern(self, experiment: str, pattern: PatternName = "scene") -> ScreenResource:
-        """Put a pattern on the kiosk page."""
-        body = {"experiment": experiment, "pattern": pattern}
+    def show_pattern(self, experiment: str, pattern: PatternName = "scene", view: int = 0) -> ScreenResource:
+        """Put a pattern on the kiosk page of a view's projector."""
+        body = {"experiment": experiment, "pattern": pattern, "view": view}
         return self._ask(ScreenResource, "PUT", "/devices/screen", body)
 
-    def clear_screen(self) -> ScreenResource:
-        """Take the pattern away from the kiosk page."""
-        return self._ask(ScreenResource, "DELETE", "/devices/screen")
+    def clear_screen(self, view: int = 0) -> ScreenResource:
+        """Take the pattern away from a kiosk page."""
+        return self._ask(ScreenResource, "DELETE", "/devices/screen", query={"view": str(view)})
 
-    def preview_pattern(self, experiment: str, pattern: PatternName = "scene", width: int = 480) -> bytes:
-        """Return a pattern as a small PNG."""
-        return self._bytes(f"/experiments/{experiment}/patterns/{pattern}", {"width": str(width)}).content
+    def preview_pattern(
+        self, experiment: str, pattern: PatternName = "scene", width: int = 480, view: int = 0
+    ) -> bytes:
+        """Return a pattern of a view's projector as a small PNG."""
+        query = {"width": str(width), "view": str(view)}
+        return self._bytes(f"/experiments/{experiment}/patterns/{pattern}", query).content
 
     # Experiments and results
 
@@ -384,10 +387,15 @@ class Client:
         return self._ask(list[PrintedResource], "GET", f"/experiments/{experiment}/prints")
 
     def print_pattern(
-        self, experiment: str, paper: str = "a3", overlap_m: float = 0.01, choose: bool = False
+        self,
+        experiment: str,
+        paper: str = "a3",
+        overlap_m: float = 0.01,
+        choose: bool = False,
+        view: str | None = None,
     ) -> PrintedResource:
-        """Make the PDF of the wall's pattern."""
-        body = {"paper": paper, "overlap_m": overlap_m, "choose": choose}
+        """Make the PDF of a wall's pattern; `view` names whose, by default the first one's."""
+        body = {"paper": paper, "overlap_m": overlap_m, "choose": choose, "view": view}
         return self._ask(PrintedResource, "POST", f"/experiments/{experiment}/prints/pattern", body)
 
     def print_board(
@@ -397,9 +405,12 @@ class Client:
         body = {"paper": paper, "board": board}
         return self._ask(PrintedResource, "POST", f"/experiments/{experiment}/prints/board", body)
 
-    def read_print(self, experiment: str, what: Literal["pattern", "board"], file: Path) -> Path:
-        """Write the PDF that was made last."""
-        content = self._bytes(f"/experiments/{experiment}/prints/{what}/pdf").content
+    def read_print(
+        self, experiment: str, what: Literal["pattern", "board"], file: Path, view: str | None = None
+    ) -> Path:
+        """Write the PDF that was made last; of a pattern, for the wall of the view called so."""
+        query = None if view is None else {"view": view}
+        content = self._bytes(f"/experiments/{experiment}/prints/{what}/pdf", query).content
         write_durably(file, lambda temporary: temporary.write_bytes(content))
         return file
 

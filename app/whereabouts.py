@@ -20,6 +20,7 @@ from app.experiment.folder import (
 from app.experiment.plan import PLAN_FILE
 from app.experiment.printed import is_of_the_scene, read_printed
 from app.experiment.rig_settings import RealCameraSettings
+from app.experiment.views import printed_walls
 from core.scene import FixedTexture
 
 
@@ -128,15 +129,21 @@ def _of_the_print(experiment: Experiment, shown: str) -> Next | None:
     rig = experiment.settings.rig
     if not isinstance(rig.camera, RealCameraSettings) or finished(experiment.captures_folder):
         return None
-    if isinstance(experiment.settings.scene.light, FixedTexture):
-        printed = read_printed(experiment, "pattern")
+    for number in printed_walls(experiment):
+        printed, view = read_printed(experiment, "pattern", number), experiment.settings.scene.views[number]
+        only = f" --view {shlex.quote(view.name)}" if number else ""
+        whose = f"the wall {view.wall}" if number else "the wall"
         if printed is None:
-            return Next(Step.print_pattern, f"airlens print pattern {shown}", "the wall needs its pattern")
+            return Next(
+                Step.print_pattern, f"airlens print pattern {shown}{only}", f"{whose} needs its pattern"
+            )
         if not is_of_the_scene(printed, experiment):
             return Next(
                 Step.print_pattern,
-                f"airlens print pattern {shown}",
-                "the scene's pattern is another than the printed one",
+                f"airlens print pattern {shown}{only}",
+                f"the pattern of {whose} is another than the printed one"
+                if number
+                else "the scene's pattern is another than the printed one",
             )
     if rig.board is None and _missing(experiment)[:1] == ["camera"]:
         return Next(
@@ -216,9 +223,15 @@ def _rig(experiment: Experiment) -> str:
 
 
 def _print(experiment: Experiment) -> str:
-    if not isinstance(experiment.settings.scene.light, FixedTexture):
-        return ""
-    printed = read_printed(experiment, "pattern")
+    walls = printed_walls(experiment)
+    told = [_print_of(experiment, number) for number in walls]
+    views = experiment.settings.scene.views
+    named = [f"{views[number].wall}: {text}" for number, text in zip(walls, told, strict=True)]
+    return "; ".join(told if len(told) == 1 else named)
+
+
+def _print_of(experiment: Experiment, view: int) -> str:
+    printed = read_printed(experiment, "pattern", view)
     if printed is None:
         return "none yet"
     rows, cols = printed.sheets

@@ -92,7 +92,7 @@ def create_app(config: ServiceConfig) -> FastAPI:
     for router in RESOURCES:
         app.include_router(router, prefix="/api")
     # The projector's browser: same origin, same session, nothing but the picture.
-    app.include_router(create_kiosk_router(services.screen), prefix="/kiosk", include_in_schema=False)
+    app.include_router(create_kiosk_router(services.screens), prefix="/kiosk", include_in_schema=False)
     add_page(app, config.page_folder)
     describe(app)
     return app

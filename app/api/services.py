@@ -20,7 +20,7 @@ from app.files.uploads.store import UploadLimits, UploadStore
 from app.jobs import Ledger
 from app.jobs.news import News
 from app.jobs.state import ACTIVE
-from app.kiosk.screen import KioskScreen
+from app.kiosk.screens import KioskScreens
 from app.live.beside import LiveAir
 from app.rig.live_camera import LiveCamera
 from app.rig.live_cameras import LiveCameras
@@ -45,7 +45,7 @@ class Services:
     beside: LiveAir
     guide: CalibrationDesk
     together: TogetherDesk
-    screen: KioskScreen
+    screens: KioskScreens
     projector: LiveProjector
 
     @property
@@ -69,8 +69,8 @@ def create_services(config: ServiceConfig) -> Services:
     cameras = LiveCameras(news.tell, busy=lambda: bool(ledger.jobs(states=ACTIVE, limit=1)))
     projector = LiveProjector(news.tell)
     beside = LiveAir(news.tell)
-    screen = KioskScreen()
-    guide = CalibrationDesk(cameras, screen, news.tell, projector)
+    screens = KioskScreens()
+    guide = CalibrationDesk(cameras, screens.of, news.tell, projector)
     return Services(
         config,
         Access(config),
@@ -86,7 +86,7 @@ def create_services(config: ServiceConfig) -> Services:
         beside,
         guide,
         TogetherDesk(cameras, guide, news.tell),
-        screen,
+        screens,
         projector,
     )
 

@@ -17,7 +17,7 @@ from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.calibrate.pictures import CalibrationStoppedError
 from app.errors import AirlensError
 from app.experiment.folder import Experiment
-from app.experiment.views import opened_for, view_number
+from app.experiment.views import lamp_number, opened_for, view_number
 from app.rig.conditions import Conditions, conditions_of
 from app.rig.lamps import lamps_beside
 from app.rig.live_cameras import LiveCameras
@@ -93,7 +93,9 @@ class GuideStatus:
 
 
 class CalibrationDesk:
-    """Uses the cameras of `live` and the operator's page as `screen`; `tell(kind, body)` hears of progress.
+    """Uses the cameras of `live`; `screen_of(view)` is the kiosk of the projector that lights a view.
+
+    `tell(kind, body)` hears of progress.
 
     Of several projectors before one camera all are dark but the one that is calibrated; `projector` is the one that
     the service speaks to already.
@@ -102,11 +104,11 @@ class CalibrationDesk:
     def __init__(
         self,
         live: LiveCameras,
-        screen: PatternDisplay,
+        screen_of: Callable[[int], PatternDisplay],
         tell: Callable[[str, Mapping[str, Any]], object],
         projector: LiveProjector | None = None,
     ) -> None:
-        self._live, self._screen, self._tell = live, screen, tell
+        self._live, self._screen_of, self._tell = live, screen_of, tell
         self._projector = projector
         self._status = GuideStatus()
         self._skipped: dict[tuple[str, StepName, str], tuple[StageTask, ...]] = {}
@@ -206,8 +208,8 @@ class CalibrationDesk:
 
     def _asked(self, experiment: Experiment, plan: LivePlan) -> GuidedCalibration:
         """The guide without a device."""
-        panel = panel_of(experiment.settings.scene, view_number(experiment, plan.camera))
-        stage = UnopenedStage(None if panel is None else self._screen, panel)
+        display, panel = self._thrown(experiment, view_number(experiment, plan.camera))
+        stage = UnopenedStage(display, panel)
         return self._guided(experiment, plan, stage)
 
     def _guided(self, experiment: Experiment, plan: LivePlan, stage: Stage) -> GuidedCalibration:
@@ -241,14 +243,21 @@ class CalibrationDesk:
     def _stage(self, experiment: Experiment, plan: LivePlan) -> Iterator[Stage]:
         """The rig, its camera also shown to whoever looks."""
         view = view_number(experiment, plan.camera)
-        panel = panel_of(experiment.settings.scene, view)
-        if panel is not None:
+        display, panel = self._thrown(experiment, view)
+        if display is not None:
             lamps_beside(experiment, self._projector).light(view)
         with shown_stage(self._live, experiment, plan.board, view) as stage:
             if not isinstance(stage, RealStage):
                 yield stage
                 return
-            yield replace(stage, display=None if panel is None else self._screen, panel_px=panel)
+            yield replace(stage, display=display, panel_px=panel)
+
+    def _thrown(
+        self, experiment: Experiment, view: int
+    ) -> tuple[PatternDisplay | None, tuple[int, int] | None]:
+        """The screen of the projector that lights a view, with its size; none of a print."""
+        panel = panel_of(experiment.settings.scene, view)
+        return (None if panel is None else self._screen_of(lamp_number(experiment, view))), panel
 
     def _progress(self, run: "Run", done: int, total: int) -> None:
         with self._lock:

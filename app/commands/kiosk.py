@@ -1,10 +1,15 @@
-"""`airlens kiosk`: show a picture on the projector through a browser, pixel for pixel."""
+"""`airlens kiosk`: show a picture on a projector through a browser, pixel for pixel; of several, on each its own."""
 
+import contextlib
 import json
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from drivers.display import PatternDisplay, Picture
 
 
 def register(cli: typer.Typer) -> None:
@@ -13,36 +18,108 @@ def register(cli: typer.Typer) -> None:
 
 
 def kiosk(
-    picture: Annotated[Path | None, typer.Argument(help="Grey picture of the native size.")] = None,
+    shown: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="PICTURE|EXPERIMENT",
+            help="Grey picture of the native size; or an experiment, each of whose projectors shows its own pattern.",
+        ),
+    ] = None,
     identify: Annotated[str | None, typer.Option(help="Show the identify frame of WIDTHxHEIGHT.")] = None,
+    view: Annotated[
+        str | None, typer.Option(help="Of an experiment: only the projector that lights this view.")
+    ] = None,
+    pattern: Annotated[
+        str, typer.Option(help="Of an experiment: scene, identify, focus, white, grey or black.")
+    ] = "scene",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 for any.")] = 8642,
     screen: Annotated[str, typer.Option(help="kiosk, or a card without desktop: /dev/dri/card0.")] = "kiosk",
     wait: Annotated[float, typer.Option(min=1.0, help="Give up after so many seconds.")] = 300.0,
-    once: Annotated[bool, typer.Option("--once", help="End when the picture is on screen.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="End when everything is on screen.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Show a picture on the projector by a page in its browser, or by a card, and say when it is there.
+    """Show pictures on projectors by pages in their browsers, or by a card, and say when they are there.
 
-    Open the printed address on the projector, full screen: chromium --kiosk ADDRESS. Move the pointer over
+    Open each printed address on its projector, full screen: chromium --kiosk ADDRESS. Move the pointer over
     the page once, so that it hides.
     """
     import time
 
     from app.capture.burst import interruptible
-    from app.rig.screens import open_screen
 
-    shown = _picture(picture, identify)
-    rows, cols = shown.shape
+    whose, pictures = _pictures(shown, identify, view, pattern)
 
     def say(text: str) -> None:
         typer.echo(json.dumps({"address": text.split()[1]}) if as_json else text)
 
-    with open_screen(screen, port, say, wait) as display, interruptible() as stopped:
-        digest = display.show(shown)
-        text = f"On screen, pixel for pixel: {cols} x {rows}, sha256 {digest}"
-        typer.echo(json.dumps({"digest": digest, "width_px": cols, "height_px": rows}) if as_json else text)
+    def told(number: int, digest: str) -> None:
+        rows, cols = pictures[number].shape
+        size = {"digest": digest, "width_px": cols, "height_px": rows}
+        on = f", of {whose[number]!r}" if whose[number] else ""
+        text = f"On screen, pixel for pixel{on}: {cols} x {rows}, sha256 {digest}"
+        typer.echo(json.dumps(size | ({"view": whose[number]} if on else {})) if as_json else text)
+
+    with _opened(screen, whose, port, say, wait) as displays, interruptible() as stopped:
+        for number, display in displays.items():
+            put = getattr(display, "put", None)
+            if put is not None:  # pages draw side by side
+                put(pictures[number])
+        for number, display in displays.items():
+            told(number, display.show(pictures[number]))
         while not once and not stopped():
             time.sleep(0.1)
+
+
+@contextlib.contextmanager
+def _opened(
+    screen: str, whose: "dict[int, str]", port: int, say: "Callable[[str], object]", wait_s: float
+) -> "Iterator[Mapping[int, PatternDisplay]]":
+    from app.errors import BadInputError
+    from app.rig.screens import open_pages, open_screen
+
+    if screen == "kiosk":
+        with open_pages(whose, port, say, wait_s) as pages:
+            yield pages
+        return
+    if len(whose) > 1:
+        named = ", ".join(repr(name) for name in whose.values())
+        raise BadInputError(
+            f"A card shows one picture, and there are the projectors of {named}. Give --view."
+        )
+    with open_screen(screen, port, say, wait_s) as display:
+        yield dict.fromkeys(whose, display)
+
+
+def _pictures(
+    shown: Path | None, identify: str | None, view: str | None, pattern: str
+) -> "tuple[dict[int, str], dict[int, Picture]]":
+    """By their projectors' numbers whose they are, where there are several, and the pictures."""
+    from typing import get_args
+
+    from app.errors import BadInputError
+    from app.experiment.folder import open_experiment
+    from app.experiment.views import lamp_number, projectors, view_names, view_number
+    from app.rig.patterns import PatternName, pattern_picture
+
+    if shown is None or not shown.is_dir():
+        if view is not None:
+            raise BadInputError("--view says which projector of an experiment: give the experiment's folder.")
+        return {0: ""}, {0: _picture(shown, identify)}
+    if identify is not None:
+        raise BadInputError("Give an experiment, or --identify WIDTHxHEIGHT; one of the two.")
+    known = {name: name for name in get_args(PatternName)}
+    if pattern not in known:
+        raise BadInputError(f"--pattern {pattern!r} is not known; expected one of {', '.join(known)}.")
+    experiment = open_experiment(shown)
+    # Where there is no projector the first view says so.
+    numbers = (
+        projectors(experiment) or (0,)
+        if view is None
+        else (lamp_number(experiment, view_number(experiment, view)),)
+    )
+    names = view_names(experiment)
+    made = {number: pattern_picture(experiment, known[pattern], number) for number in numbers}
+    return {number: names[number] if len(names) > 1 else "" for number in numbers}, made
 
 
 def _picture(path: Path | None, identify: str | None):
@@ -53,7 +130,7 @@ def _picture(path: Path | None, identify: str | None):
     from drivers.identify import identify_frame
 
     if (path is None) == (identify is None):
-        raise BadInputError("Give a picture, or --identify WIDTHxHEIGHT; one of the two.")
+        raise BadInputError("Give a picture, an experiment, or --identify WIDTHxHEIGHT; one of them.")
     if identify is not None:
         width, cross, height = identify.partition("x")
         if not (cross and width.isdigit() and height.isdigit()):

@@ -6,7 +6,7 @@ from app.commands.lazy import lazy_group
 
 _MODULE = "app.commands.print_sheets"
 SHEETS = {
-    "pattern": (_MODULE, "Write the scene's printed pattern as a PDF at true scale, in sheets that overlap."),
+    "pattern": (_MODULE, "Write each wall's printed pattern as a PDF at true scale, in sheets that overlap."),
     "board": (_MODULE, "Write a board to calibrate with as a PDF at true scale."),
 }
 

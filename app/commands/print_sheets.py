@@ -31,16 +31,37 @@ def pattern(
         ),
     ] = False,
     out: Out = None,
+    view: Annotated[
+        str | None,
+        typer.Option(help="The view whose wall it is for; without it every wall's that is printed."),
+    ] = None,
 ) -> None:
-    """Write the scene's printed pattern as a PDF at true scale, in sheets that overlap."""
+    """Write each wall's printed pattern as a PDF at true scale, in sheets that overlap."""
+    from app.calibrate.options import length_m
+    from app.errors import BadInputError
+    from app.experiment.folder import open_experiment
+    from app.experiment.views import printed_walls, view_names
+
+    overlap_m, opened = length_m(overlap, "--overlap"), open_experiment(experiment)
+    names = view_names(opened)
+    # Where nothing is printed the first one says why.
+    wanted = [view] if view else [names[number] for number in printed_walls(opened) or (0,)]
+    if out is not None and len(wanted) > 1:
+        raise BadInputError(
+            f"--out names one file, and {len(wanted)} walls bear a print: say whose with --view, one of "
+            f"{', '.join(map(repr, wanted))}."
+        )
+    for one in wanted:
+        _write(experiment, one, paper, overlap_m, choose, out)
+
+
+def _write(experiment: Path, view: str, paper: str, overlap_m: float, choose: bool, out: Path | None) -> None:
     from rich.progress import Progress
 
-    from app.calibrate.options import length_m
     from app.experiment.folder import open_experiment
     from app.sheets.pattern import choose_pattern, print_pattern
 
-    overlap_m = length_m(overlap, "--overlap")
-    opened = choose_pattern(experiment) if choose else open_experiment(experiment)
+    opened = choose_pattern(experiment, view) if choose else open_experiment(experiment)
     with Progress(transient=True) as progress:
         task = progress.add_task("sheets", total=None)
         path, printed = print_pattern(
@@ -49,10 +70,12 @@ def pattern(
             out,
             overlap_m,
             on_sheet=lambda done, total: progress.update(task, completed=done, total=total),
+            view=view,
         )
     rows, cols = printed.sheets
+    whose = "" if printed.view is None else f"{printed.view}: "
     typer.echo(
-        f"{path}: {rows * cols} sheets of {printed.paper}, {rows} rows of {cols}, for {printed.width_m:.3f} x "
+        f"{whose}{path}: {rows * cols} sheets of {printed.paper}, {rows} rows of {cols}, for {printed.width_m:.3f} x "
         f"{printed.height_m:.3f} m of wall; finest period {1e3 * (printed.finest_period_m or 0):.3g} mm, "
         f"{printed.finest_period_camera_px:.2g} camera px. Print at 100 % and hold a ruler to the bar of 100 mm."
     )

@@ -2,6 +2,7 @@
 
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
+from core.scene import FixedTexture
 
 
 def view_names(experiment: Experiment) -> tuple[str, ...]:
@@ -46,6 +47,24 @@ def lamp_number(experiment: Experiment, view: int) -> int:
     scene = experiment.settings.scene
     lights = [(one.wall, one.light or scene.light) for one in scene.views]
     return lights.index(lights[view])
+
+
+def lamps(experiment: Experiment) -> tuple[int, ...]:
+    """The numbers of the views that each have a light of their own: one a wall, more where projectors take turns."""
+    return tuple(sorted({lamp_number(experiment, n) for n in range(len(view_names(experiment)))}))
+
+
+def printed_walls(experiment: Experiment) -> tuple[int, ...]:
+    """Those whose wall bears a print."""
+    scene = experiment.settings.scene
+    return tuple(
+        n for n in lamps(experiment) if isinstance(scene.views[n].light or scene.light, FixedTexture)
+    )
+
+
+def projectors(experiment: Experiment) -> tuple[int, ...]:
+    """Those whose wall a projector lights."""
+    return tuple(n for n in lamps(experiment) if n not in printed_walls(experiment))
 
 
 def take_turns(experiment: Experiment) -> bool:

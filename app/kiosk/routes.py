@@ -1,20 +1,23 @@
-"""The kiosk page: routes that show a picture on a browser's screen and take its report.
+"""The kiosk pages: routes that show a picture on a browser's screen and take its report, for each projector its own.
 
-    app.include_router(create_kiosk_router(screen), prefix="/kiosk")      then open /kiosk/page
+    app.include_router(create_kiosk_router(screens), prefix="/kiosk")     then open /kiosk/page, /kiosk/1/page
 
-The page asks for no data but the picture, and runs no script but its own file.
+A page asks for no data but the picture, and runs no script but its own file.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, FastAPI, HTTPException
+from fastapi import APIRouter, Depends, FastAPI, HTTPException
+from fastapi import Path as PathPart
 from pydantic import Field
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.responses import FileResponse, Response
 
 from app.files.toml import Strict
 from app.kiosk.screen import KioskScreen, ScreenReport
+from app.kiosk.screens import MOST, KioskScreens
 
 FOLDER = Path(__file__).parent / "page"
 POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; frame-ancestors 'none'"
@@ -45,37 +48,50 @@ class ReportBody(Strict):
     device_pixel_ratio: Annotated[float, Field(ge=0, le=1000)]
 
 
-def create_kiosk_router(screen: KioskScreen) -> APIRouter:
-    """Return the routes of the page and its data, for one screen."""
+def create_kiosk_router(screens: KioskScreens) -> APIRouter:
+    """Return the routes of all screens: those of the first projector, and below its number those of each."""
     router = APIRouter(tags=["kiosk"])
+
+    def first() -> KioskScreen:
+        return screens.of(0)
+
+    def numbered(number: Annotated[int, PathPart(ge=0, lt=MOST)]) -> KioskScreen:
+        return screens.of(number)
+
+    _add_routes(router, first)
+    own = APIRouter(prefix="/{number}")
+    _add_routes(own, numbered)
+    router.include_router(own)
+    return router
+
+
+def _add_routes(router: APIRouter, screen_of: Callable[..., KioskScreen]) -> None:
     for name, (file, media) in _FILES.items():
         router.add_api_route(f"/{name}", _file(file, media), include_in_schema=False, methods=["GET"])
 
     @router.get("/frame")
-    def frame() -> FrameAnswer:
+    def frame(screen: Annotated[KioskScreen, Depends(screen_of)]) -> FrameAnswer:
         digest, picture = screen.current
         rows, cols = (0, 0) if picture is None else picture.shape
         return FrameAnswer(id=digest, width_px=cols, height_px=rows)
 
     @router.get("/frames/{digest}")
-    def pixels(digest: str) -> Response:
+    def pixels(digest: str, screen: Annotated[KioskScreen, Depends(screen_of)]) -> Response:
         current, picture = screen.current
         if picture is None or digest != current:
             raise HTTPException(404, "That picture is not shown any more. Ask which one is.")
         return Response(picture.tobytes(), media_type="application/octet-stream")
 
     @router.post("/report", status_code=204)
-    def report(body: ReportBody) -> None:
+    def report(body: ReportBody, screen: Annotated[KioskScreen, Depends(screen_of)]) -> None:
         screen.take_report(ScreenReport(**body.model_dump()))
 
-    return router
 
-
-def create_kiosk_app(screen: KioskScreen) -> FastAPI:
-    """Return a small service with nothing but the page, for the loopback address."""
+def create_kiosk_app(screens: KioskScreens) -> FastAPI:
+    """Return a small service with nothing but the pages, for the loopback address."""
     app = FastAPI(title="airlens kiosk", openapi_url=None, docs_url=None, redoc_url=None)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=["127.0.0.1", "localhost"])
-    app.include_router(create_kiosk_router(screen), prefix="/kiosk")
+    app.include_router(create_kiosk_router(screens), prefix="/kiosk")
     return app
 
 

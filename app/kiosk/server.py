@@ -1,4 +1,4 @@
-"""A kiosk page served from this process, for the command line: a thread that lives as long as it is used."""
+"""Kiosk pages served from this process, for the command line: a thread that lives as long as they are used."""
 
 import contextlib
 import socket
@@ -10,14 +10,17 @@ import uvicorn
 
 from app.errors import AirlensError
 from app.kiosk.routes import create_kiosk_app
-from app.kiosk.screen import KioskScreen
+from app.kiosk.screens import KioskScreens
 
 START_S = 10.0
 
 
 @contextlib.contextmanager
-def serve_kiosk(screen: KioskScreen, port: int = 0) -> Iterator[str]:
-    """Yield the page's address while it is served. Raises AirlensError when the port is taken."""
+def serve_kiosk(screens: KioskScreens, port: int = 0) -> Iterator[str]:
+    """Yield the address before the pages' paths while they are served. Raises AirlensError for a port that is taken.
+
+    `page_of` has the path of each page.
+    """
     listener = socket.socket()
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -27,7 +30,7 @@ def serve_kiosk(screen: KioskScreen, port: int = 0) -> Iterator[str]:
         raise AirlensError(
             f"Port {port} cannot be used ({error.strerror}). Choose another with --port, or 0 for any."
         ) from None
-    settings = uvicorn.Config(create_kiosk_app(screen), log_level="warning", lifespan="off")
+    settings = uvicorn.Config(create_kiosk_app(screens), log_level="warning", lifespan="off")
     server = uvicorn.Server(settings)
     thread = threading.Thread(target=server.run, args=([listener],), name="kiosk", daemon=True)
     thread.start()
@@ -35,7 +38,7 @@ def serve_kiosk(screen: KioskScreen, port: int = 0) -> Iterator[str]:
     while not server.started and time.monotonic() < deadline_s:
         time.sleep(0.01)
     try:
-        yield f"http://127.0.0.1:{listener.getsockname()[1]}/kiosk/page"
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}"
     finally:
         server.should_exit = True
         thread.join(START_S)

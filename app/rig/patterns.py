@@ -1,4 +1,4 @@
-"""Pictures for the projector: the scene's own pattern, and a few that help to set it up."""
+"""Pictures for a projector: the scene's own pattern, and a few that help to set it up."""
 
 from typing import Literal
 
@@ -16,21 +16,27 @@ FOCUS = CheckerPattern(square_px=8.0)
 LEVELS = {"white": 255, "grey": 128, "black": 0}
 
 
-def panel_px(experiment: Experiment) -> tuple[int, int]:
-    """Return the projector's native columns and rows. Raises BadInputError for a rig without a projector."""
-    light = experiment.settings.scene.light
-    if not isinstance(light, ProjectedPattern):
+def projected(experiment: Experiment, view: int = 0) -> ProjectedPattern:
+    """Return what the projector of a view throws. Raises BadInputError for a view without a projector."""
+    scene = experiment.settings.scene
+    light = scene.views[view].light or scene.light
+    if isinstance(light, ProjectedPattern):
+        return light
+    if len(scene.views) == 1:
         raise BadInputError(
             f"The light of {experiment.folder.name} is a printed texture: there is nothing to project. "
             "Choose an experiment whose light is a projector."
         )
-    return light.projector.width_px, light.projector.height_px
+    raise BadInputError(
+        f"The light of the view {scene.views[view].name!r} is a printed texture: there is nothing to project. "
+        "Choose a view whose light is a projector."
+    )
 
 
-def pattern_picture(experiment: Experiment, name: PatternName) -> Picture:
-    """Return the picture at the projector's native size. Raises BadInputError, SettingError."""
-    cols, rows = panel_px(experiment)
-    light = experiment.settings.scene.light
+def pattern_picture(experiment: Experiment, name: PatternName, view: int = 0) -> Picture:
+    """Return the picture at the native size of a view's projector. Raises BadInputError, SettingError."""
+    light = projected(experiment, view)
+    cols, rows = light.projector.width_px, light.projector.height_px
     if name in LEVELS:
         return np.full((rows, cols), LEVELS[name], np.uint8)
     if name == "identify":

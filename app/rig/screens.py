@@ -1,10 +1,10 @@
 """The projector's screen for the command line: a page in a browser, or a graphics card without a desktop."""
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from app.kiosk.screen import KioskScreen
+from app.kiosk.screens import KioskScreens, page_of
 from app.kiosk.server import serve_kiosk
 from drivers.display import PatternDisplay
 from drivers.drm import DrmDisplay
@@ -22,7 +22,21 @@ def open_screen(
         with DrmDisplay(Path(screen)) as display:
             yield display
         return
-    kiosk = KioskScreen(timeout_s=wait_s)
-    with serve_kiosk(kiosk, port) as address:
-        say(f"Open {address} on the projector, full screen: chromium --kiosk {address}")
-        yield kiosk
+    with open_pages({0: ""}, port, say, wait_s) as displays:
+        yield displays[0]
+
+
+@contextlib.contextmanager
+def open_pages(
+    projectors: Mapping[int, str], port: int, say: Callable[[str], object], wait_s: float = 120.0
+) -> Iterator[dict[int, PatternDisplay]]:
+    """A page for each projector, by its number; the name says whose it is, where there are several.
+
+    Raises AirlensError for a port that is taken.
+    """
+    kiosks = KioskScreens(timeout_s=wait_s)
+    with serve_kiosk(kiosks, port) as address:
+        for number, name in projectors.items():
+            page, whose = f"{address}{page_of(number)}", f" of {name!r}" if name else ""
+            say(f"Open {page} on the projector{whose}, full screen: chromium --kiosk {page}")
+        yield {number: kiosks.of(number) for number in projectors}

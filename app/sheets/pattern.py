@@ -1,6 +1,6 @@
-"""The scene's printed pattern as sheets of paper: the very luminance that the simulator renders.
+"""A wall's printed pattern as sheets of paper: the very luminance that the simulator renders.
 
-The scene describes the pattern in pixels of `pixel_m`, and the renderer reads between them by a cubic spline. So do
+The scene describes each pattern in pixels of `pixel_m`, and the renderer reads between them by a cubic spline. So do
 the sheets, in print pixels of at most half a millimetre; grey 0 to 255 is luminance 0 to 1.
 """
 
@@ -15,7 +15,8 @@ from scipy.ndimage import affine_transform, spline_filter
 
 from app.errors import BadInputError
 from app.experiment.folder import Experiment, open_experiment, save_settings
-from app.experiment.printed import PRINT_FOLDER, Printed
+from app.experiment.printed import PRINT_FOLDER, Printed, name_of, named
+from app.experiment.views import lamp_number, printed_walls, view_number
 from app.files.lock import locked
 from app.files.toml import to_plain
 from app.sheets.drawing import Sheets, shared_by
@@ -31,6 +32,7 @@ from core.plan.print_choice import (
 )
 from core.render.light import texture_size
 from core.scene import CheckerPattern, FixedTexture, Scene
+from core.view_frame import facing
 
 _PRINT_PIXEL_M = 0.0005
 # A cubic spline's coefficients forget what is so many pixels away, to 1e-9.
@@ -94,41 +96,60 @@ class PrintPattern:
         return affine_transform(knots, scale, offset, shape, order=3, mode="mirror", prefilter=False)  # type: ignore[arg-type]
 
 
-def choose_pattern(folder: Path) -> Experiment:
-    """Give the scene the finest print that suits its coarsest camera, of the same seed. Raises BadInputError."""
+def choose_pattern(folder: Path, view: str | None = None) -> Experiment:
+    """Give a view (by default the first) the finest print that suits its light's coarsest camera, of the same seed.
+
+    Raises BadInputError.
+    """
     with locked(folder):
         experiment = open_experiment(folder)
-        scene = experiment.settings.scene
-        _print_of(scene)
-        camera, room = coarsest(scene)
+        number, scene = _number(experiment, view), experiment.settings.scene
+        own, before = scene.views[number].light, _print_of(scene, number)
+        camera, room = coarsest(scene, number)
         distance_m = room.upper_m[1] - camera.position_m[1]
-        light = suited_print(camera, distance_m, getattr(scene.light.pattern, "seed", 0))
-        changed = experiment.settings.model_copy(update={"scene": replace(scene, light=light)})
-        return save_settings(folder, changed)
+        light = suited_print(camera, distance_m, getattr(before.pattern, "seed", 0))
+        if own is None:
+            scene = replace(scene, light=light)
+        else:
+            views = tuple(replace(one, light=light) if one.light == own else one for one in scene.views)
+            scene = replace(scene, views=views)
+        return save_settings(folder, experiment.settings.model_copy(update={"scene": scene}))
 
 
-def print_pattern_of(scene: Scene) -> PrintPattern:
-    """The scene's print. Raises BadInputError: a projector lights it, or the camera cannot see it."""
-    light = _print_of(scene)
-    period_px = period_in_camera_px(light, scene)
+def print_pattern_of(scene: Scene, view: int = 0) -> PrintPattern:
+    """The print of a view's wall. Raises BadInputError: a projector lights it, or the camera cannot see it."""
+    light = _print_of(scene, view)
+    period_px = period_in_camera_px(light, scene, view)
     if period_px < LEAST_PERIOD_PX * (1 - 1e-6):
         raise BadInputError(
             f"The pattern's finest period is {1e3 * finest_period_m(light):.3g} mm, {period_px:.2g} pixels of the "
-            f"camera; expected {LEAST_PERIOD_PX:g} at least. Set scene.light.pixel_m = "
+            f"camera; expected {LEAST_PERIOD_PX:g} at least. Set {_place(scene, view)}.pixel_m = "
             f"{light.pixel_m * LEAST_PERIOD_PX / period_px:.3g} in experiment.toml, or give --choose."
         )
-    rows, cols = texture_size(scene.room, light.pixel_m)
+    rows, cols = texture_size(facing(scene, view)[0].room, light.pixel_m)
     fine = max(1, math.ceil(light.pixel_m / _PRINT_PIXEL_M - 1e-9))
     return PrintPattern(light, rows, cols, fine, pattern_parts(light.pattern, rows, cols))
 
 
-def _print_of(scene: Scene) -> FixedTexture:
-    if isinstance(scene.light, FixedTexture):
-        return scene.light
+def _print_of(scene: Scene, view: int) -> FixedTexture:
+    light = scene.views[view].light or scene.light
+    if isinstance(light, FixedTexture):
+        return light
+    whose = "of this experiment" if len(scene.views) == 1 else f"of {scene.views[view].name!r}"
     raise BadInputError(
-        "The light of this experiment is a projector: there is nothing to print. Boards are printed by "
+        f"The light {whose} is a projector: there is nothing to print. Boards are printed by "
         "`airlens print board`."
     )
+
+
+def _place(scene: Scene, view: int) -> str:
+    """Where experiment.toml has a view's light."""
+    return "scene.light" if scene.views[view].light is None else f"scene.views[{view}].light"
+
+
+def _number(experiment: Experiment, view: str | None) -> int:
+    """The view that stands for a wall's print: the first one that sees by it. Raises BadInputError."""
+    return 0 if view is None else lamp_number(experiment, view_number(experiment, view))
 
 
 def print_pattern(
@@ -137,18 +158,22 @@ def print_pattern(
     out: Path | None = None,
     overlap_m: float = 0.01,
     on_sheet: OnSheet = lambda done, total: None,
+    view: str | None = None,
 ) -> tuple[Path, Printed]:
-    """Write the pattern as a PDF and what was printed into the experiment. Raises BadInputError."""
-    scene = experiment.settings.scene
-    pattern = print_pattern_of(scene)
+    """Write the pattern of a view's wall (by default the first one's) as a PDF, and what was printed into the
+    experiment. Raises BadInputError."""
+    scene, number = experiment.settings.scene, _number(experiment, view)
+    pattern, of = print_pattern_of(scene, number), named(experiment, number)
     layout = laid_out(*pattern.size_px, pattern.print_pixel_m, paper, overlap_m)
-    path = out or experiment.folder / PRINT_FOLDER / f"pattern-{layout.paper.name}.pdf"
-    period_px = period_in_camera_px(pattern.light, scene)
+    path = out or experiment.folder / PRINT_FOLDER / f"{name_of('pattern', of)}-{layout.paper.name}.pdf"
+    period_px = period_in_camera_px(pattern.light, scene, number)
+
+    wall = scene.views[number].wall if len(printed_walls(experiment)) > 1 else ""
 
     def draw(sheets: Sheets) -> None:
         for number, tile in enumerate(layout.tiles, 1):
             picture = pattern.picture(tile.rows, tile.cols)
-            footer = _footer(pattern, layout, tile, period_px)
+            footer = _footer(pattern, layout, tile, period_px, wall)
             shared = shared_by(layout, tile, pattern.print_pixel_m)
             sheets.add(layout.paper, picture, pattern.print_pixel_m, footer, shared)
             on_sheet(number, len(layout.tiles))
@@ -160,6 +185,7 @@ def print_pattern(
         path,
         digest,
         what="pattern",
+        view=of,
         content=to_plain(pattern.light),
         width_m=cols * pattern.print_pixel_m,
         height_m=rows * pattern.print_pixel_m,
@@ -172,13 +198,16 @@ def print_pattern(
     )
 
 
-def _footer(pattern: PrintPattern, layout: Layout, tile: Tile, period_px: float) -> tuple[str, str]:
+def _footer(
+    pattern: PrintPattern, layout: Layout, tile: Tile, period_px: float, wall: str
+) -> tuple[str, str]:
     kind = pattern.light.pattern
     seed = "" if isinstance(kind, CheckerPattern) else f", seed {kind.seed}"
     rows, cols = layout.sheets
+    on = f"Wall {wall}: row" if wall else "Row"
     return (
         f"airlens {version()}: {kind.kind}{seed}, scale 1:1, pattern pixel {1e3 * pattern.light.pixel_m:.4g} mm, "
         f"finest period {1e3 * finest_period_m(pattern.light):.3g} mm = {period_px:.2g} camera px",
-        f"Row {tile.row} of {rows} from the top, column {tile.col} of {cols} from the left, on {layout.paper.name}. "
+        f"{on} {tile.row} of {rows} from the top, column {tile.col} of {cols} from the left, on {layout.paper.name}. "
         "Inner marks: the next sheet's picture ends there.",
     )

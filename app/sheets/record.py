@@ -38,5 +38,5 @@ def keep_record(experiment: Experiment, path: Path, digest: str, **told: Any) ->
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         **told,
     )
-    write_json(experiment.folder / record_name(printed.what), to_plain(printed))
+    write_json(experiment.folder / record_name(printed.what, printed.view), to_plain(printed))
     return printed

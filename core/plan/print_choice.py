@@ -17,9 +17,13 @@ def camera_pixel_m(camera: Optics, room: Box) -> float:
     return (room.upper_m[1] - camera.position_m[1]) / camera.focal_px[0]
 
 
-def coarsest(scene: Scene) -> tuple[Optics, Box]:
-    """Of the cameras that see by the scene's light the one of the largest pixels on its wall, in its own frame."""
-    seeing = [n for n, view in enumerate(scene.views) if view.light is None] or list(range(len(scene.views)))
+def coarsest(scene: Scene, view: int | None = None) -> tuple[Optics, Box]:
+    """Of the cameras that see by a view's light the one of the largest pixels on its wall, in its own frame.
+
+    Without a view by the scene's light.
+    """
+    light = None if view is None else scene.views[view].light
+    seeing = [n for n, one in enumerate(scene.views) if one.light == light] or list(range(len(scene.views)))
     frames = [facing(scene, n) for n in seeing]
     found = [(own.views[n].camera, own.room) for own, n in frames]
     return max(found, key=lambda of: camera_pixel_m(*of))
@@ -44,9 +48,9 @@ def finest_period_px(pattern: Pattern) -> float:
     return 2.0 * (pattern.diameter_px if isinstance(pattern, DotPattern) else pattern.square_px)
 
 
-def period_in_camera_px(light: FixedTexture, scene: Scene) -> float:
-    """The finest period in pixels of the camera that sees it coarsest, were the scene lit by this print."""
-    return finest_period_m(light) / camera_pixel_m(*coarsest(scene))
+def period_in_camera_px(light: FixedTexture, scene: Scene, view: int | None = None) -> float:
+    """The finest period in pixels of the camera that sees it coarsest, were the view or the scene lit so."""
+    return finest_period_m(light) / camera_pixel_m(*coarsest(scene, view))
 
 
 def finest_period(light: FixedTexture, scene: Scene) -> Choice:

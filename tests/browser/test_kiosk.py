@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.kiosk.screen import KioskScreen
+from app.kiosk.screens import KioskScreens, page_of
 from app.kiosk.server import serve_kiosk
 from drivers.errors import DeviceSettingError
 
@@ -85,11 +85,12 @@ def browser(url, folder, *options):
 def test_the_screen_equals_the_file_bit_for_bit():
     sent = picture()
     with virtual_screen() as (env, file, folder):
-        screen = KioskScreen(timeout_s=120.0)
+        screens = KioskScreens(timeout_s=120.0)
+        screen = screens.of(0)
         with (
             running("matchbox-window-manager", "-use_titlebar", "no", env=env),
-            serve_kiosk(screen) as url,
-            running(*browser(url, folder, "--kiosk"), env=env),
+            serve_kiosk(screens) as url,
+            running(*browser(url + page_of(0), folder, "--kiosk"), env=env),
         ):
             digest = screen.show(sent)
             assert screen.is_showing(digest)
@@ -107,10 +108,11 @@ def test_the_screen_equals_the_file_bit_for_bit():
 
 def test_a_window_that_is_not_full_screen_refuses_and_says_which_size_is_wanted():
     with virtual_screen() as (env, _, folder):
-        screen = KioskScreen(timeout_s=120.0)
+        screens = KioskScreens(timeout_s=120.0)
+        screen = screens.of(0)
         with (
-            serve_kiosk(screen) as url,
-            running(*browser(f"--app={url}", folder, "--window-size=900,700"), env=env),
+            serve_kiosk(screens) as url,
+            running(*browser(f"--app={url}{page_of(0)}", folder, "--window-size=900,700"), env=env),
             pytest.raises(DeviceSettingError, match=rf"the pattern needs {COLS} x {ROWS}"),
         ):
             screen.show(picture())

@@ -32,7 +32,7 @@ class SeenWallLine(WireModel):
     """A view: what it is called, the wall that it looks at, and whose camera takes its pictures.
 
     `camera` is the number of the view whose camera is opened for it, mostly its own; `camera_of` names that view
-    where it is another one. `light` is what patterns the wall.
+    where it is another one. `light` is what patterns the wall, `lamp` the number of the first view that has it.
     """
 
     name: str
@@ -40,6 +40,7 @@ class SeenWallLine(WireModel):
     camera: int
     camera_of: str | None = None
     light: Literal["texture", "projector"]
+    lamp: int
 
 
 class ExperimentLine(WireModel):

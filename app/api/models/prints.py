@@ -9,8 +9,12 @@ from app.api.models.strict import WireModel
 
 
 class NewPattern(WireModel):
-    """Sheets of the wall's pattern; `choose` first gives the scene the finest pattern that suits its camera."""
+    """Sheets of a wall's pattern; `choose` first gives the scene the finest pattern that suits its camera.
 
+    `view` says whose wall; without it the first one's.
+    """
+
+    view: str | None = Field(default=None, max_length=200)
     paper: str = Field(default="a3", max_length=20)
     overlap_m: float = Field(default=0.01, ge=0, le=0.1)
     choose: bool = False
@@ -24,8 +28,12 @@ class NewBoard(WireModel):
 
 
 class PrintedResource(WireModel):
-    """A PDF that was made: rows and columns of its sheets, what is on them, and the finest period."""
+    """A PDF that was made: rows and columns of its sheets, what is on them, and the finest period.
 
+    `view` is whose wall's pattern it is; null is the first one's.
+    """
+
+    view: str | None
     what: Literal["pattern", "board"]
     paper: str
     sheets: list[int]

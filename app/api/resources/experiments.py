@@ -27,7 +27,7 @@ from app.calibrate.parts import is_calibrated, parts_of
 from app.errors import BadInputError
 from app.experiment.folder import SETTINGS_FILE, Experiment, finished, save_settings
 from app.experiment.plan import PLAN_FILE
-from app.experiment.views import opened_for
+from app.experiment.views import lamp_number, opened_for
 from app.files.reading import reading
 from app.files.toml import to_plain
 from app.simulate.rehearsal import Rehearsal, rehearse
@@ -156,6 +156,7 @@ def _line(experiment: Experiment) -> ExperimentLine:
                 camera=opened_for(experiment, number),
                 camera_of=view.camera_of,
                 light=_kind(view.light or settings.scene.light),
+                lamp=lamp_number(experiment, number),
             )
             for number, view in enumerate(settings.scene.views)
         ],

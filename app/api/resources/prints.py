@@ -1,8 +1,8 @@
 """PDFs at true scale: the wall's pattern, and boards to calibrate with."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 
 from app.api.models.prints import NewBoard, NewPattern, PrintedResource
@@ -12,19 +12,21 @@ from app.api.wire.bodies import body
 from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
 from app.experiment.folder import Experiment
-from app.experiment.printed import Printed, is_of_the_scene, read_printed
+from app.experiment.printed import Printed, is_of_the_scene, name_of, read_printed
+from app.experiment.views import lamp_number, printed_walls, view_number
 
 router = APIRouter(tags=["prints"])
 What = Literal["pattern", "board"]
+ViewName = Annotated[str | None, Query(max_length=200, description="Whose wall, by the view's name.")]
 PDF = body("application/pdf", "Sheets at true scale: print them at 100 %.")
 
 
 @router.get("/experiments/{experiment}/prints")
 def list_prints(given: Given, experiment: Identifier) -> list[PrintedResource]:
-    """List what was printed: the pattern, the board."""
+    """List what was printed: each wall's pattern, the board."""
     found = given.folders.open(experiment)
-    kinds: tuple[What, ...] = ("pattern", "board")
-    records = [read_printed(found, what) for what in kinds]
+    records = [read_printed(found, "pattern", number) for number in printed_walls(found)]
+    records.append(read_printed(found, "board"))
     return [_resource(one, found) for one in records if one is not None]
 
 
@@ -37,8 +39,8 @@ def print_pattern(given: Given, experiment: Identifier, new: NewPattern) -> Prin
 
     found = given.folders.open(experiment)
     if new.choose:
-        found = choose_pattern(found.folder)
-    _, printed = made(found, new.paper, overlap_m=new.overlap_m)
+        found = choose_pattern(found.folder, new.view)
+    _, printed = made(found, new.paper, overlap_m=new.overlap_m, view=new.view)
     given.ledger.append_event("experiment", {"experiment": experiment, "changed": True})
     return _resource(printed, found)
 
@@ -61,18 +63,20 @@ def print_board(given: Given, experiment: Identifier, new: NewBoard) -> PrintedR
 
 
 @router.get("/experiments/{experiment}/prints/{what}/pdf", response_class=Response, responses=PDF)
-def read_print(given: Given, experiment: Identifier, what: What) -> Response:
-    """Return the PDF that was made last."""
+def read_print(given: Given, experiment: Identifier, what: What, view: ViewName = None) -> Response:
+    """Return the PDF that was made last; of a pattern, for the wall of a view (by default the first one's)."""
     found = given.folders.open(experiment)
-    printed = read_printed(found, what)
+    number = 0 if view is None or what == "board" else lamp_number(found, view_number(found, view))
+    printed = read_printed(found, what, number)
     if printed is None:
         raise ApiError("not_found", f"No {what} was printed for {experiment!r}.", "Make the PDF first.")
-    name = f"{found.folder.name}-{what}.pdf"
+    name = f"{found.folder.name}-{name_of(what, printed.view)}.pdf"
     return FileResponse(found.file(printed.file), media_type="application/pdf", filename=name)
 
 
 def _resource(printed: Printed, experiment: Experiment) -> PrintedResource:
     return PrintedResource(
+        view=printed.view,
         what=printed.what,
         paper=printed.paper,
         sheets=list(printed.sheets),

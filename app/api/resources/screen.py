@@ -1,4 +1,4 @@
-"""What the projector's own page (the kiosk) shows: which pattern, and whether it is there pixel for pixel."""
+"""What a projector's own page (its kiosk) shows: which pattern, and whether it is there pixel for pixel."""
 
 from typing import Annotated
 
@@ -9,32 +9,41 @@ from app.api.models.screen import ScreenResource, ShowPattern, State
 from app.api.services import Given, Services
 from app.api.wire.bodies import body
 from app.api.wire.identifier import Identifier
+from app.api.wire.problems import ApiError
+from app.experiment.folder import Experiment
+from app.experiment.views import lamp_number
 from app.kiosk.screen import KioskScreen
+from app.kiosk.screens import MOST, page_of
 from app.rig.patterns import PatternName, pattern_picture
 from drivers.display import Picture
 
 router = APIRouter(tags=["devices"])
+ViewNumber = Annotated[
+    int, Query(ge=0, lt=MOST, description="Whose projector, by the view's number, from 0.")
+]
 PICTURE = body("image/png", "The pattern, made smaller for the eyes.")
 
 
 @router.get("/devices/screen")
-def read_screen(given: Given) -> ScreenResource:
-    """Return what the kiosk page last said."""
-    return _resource(given)
+def read_screen(given: Given, view: ViewNumber = 0) -> ScreenResource:
+    """Return what the kiosk page of a projector last said."""
+    return _resource(given, view)
 
 
 @router.put("/devices/screen")
 def show_pattern(given: Given, wanted: ShowPattern) -> ScreenResource:
-    """Put a pattern on the kiosk page; it is there as soon as `state` is `showing`."""
-    given.screen.put(pattern_picture(given.folders.open(wanted.experiment), wanted.pattern))
-    return _resource(given)
+    """Put a pattern on the kiosk page of a view's projector; it is there as soon as `state` is `showing`."""
+    experiment = given.folders.open(wanted.experiment)
+    number = _lamp(experiment, wanted.view)
+    given.screens.of(number).put(pattern_picture(experiment, wanted.pattern, number))
+    return _resource(given, number)
 
 
 @router.delete("/devices/screen")
-def clear_screen(given: Given) -> ScreenResource:
+def clear_screen(given: Given, view: ViewNumber = 0) -> ScreenResource:
     """Take the pattern away."""
-    given.screen.close()
-    return _resource(given)
+    given.screens.of(view).close()
+    return _resource(given, view)
 
 
 @router.get("/experiments/{experiment}/patterns/{pattern}", response_class=Response, responses=PICTURE)
@@ -43,10 +52,20 @@ def preview_pattern(
     experiment: Identifier,
     pattern: PatternName,
     width: Annotated[int, Query(ge=16, le=4096, description="At most so many columns.")] = 480,
+    view: ViewNumber = 0,
 ) -> Response:
-    """Return a pattern as a small picture."""
-    picture = pattern_picture(given.folders.open(experiment), pattern)
+    """Return a pattern of a view's projector as a small picture."""
+    found = given.folders.open(experiment)
+    picture = pattern_picture(found, pattern, _lamp(found, view))
     return Response(_small_png(picture, width), media_type="image/png")
+
+
+def _lamp(experiment: Experiment, view: int) -> int:
+    """The number of the view whose projector lights that view. Raises ApiError where there is no such view."""
+    views = len(experiment.settings.scene.views)
+    if view >= views:
+        raise ApiError("not_found", f"The experiment has {views} views; there is no view {view}.")
+    return lamp_number(experiment, view)
 
 
 def _small_png(picture: Picture, width: int) -> bytes:
@@ -57,12 +76,20 @@ def _small_png(picture: Picture, width: int) -> bytes:
     return encoded.tobytes() if done else b""
 
 
-def _resource(given: Services) -> ScreenResource:
-    screen = given.screen
+def _resource(given: Services, view: int) -> ScreenResource:
+    screen = given.screens.of(view)
     digest, size_px = screen.wanted
     state, reason = _state(screen, digest)
     cols, rows = size_px or (None, None)
-    return ScreenResource(state=state, width_px=cols, height_px=rows, digest=digest, reason=reason)
+    return ScreenResource(
+        view=view,
+        state=state,
+        width_px=cols,
+        height_px=rows,
+        digest=digest,
+        reason=reason,
+        page=page_of(view),
+    )
 
 
 def _state(screen: KioskScreen, digest: str) -> tuple[State, str]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app.kiosk.screen import KioskScreen
+from app.kiosk.screens import KioskScreens, page_of
 from app.kiosk.server import serve_kiosk
 from drivers.display import PatternDisplay, picture_digest
 from drivers.errors import DeviceSettingError, DeviceTimeoutError
@@ -14,10 +15,10 @@ from drivers.errors import DeviceSettingError, DeviceTimeoutError
 PICTURE = np.arange(12, dtype=np.uint8).reshape(3, 4)
 
 
-def page(client, digest=None, reason=""):
+def page(client, digest=None, reason="", at="/kiosk"):
     """Do what the page does: look, fetch, report."""
-    frame = client.get("/kiosk/frame").json()
-    data = client.get(f"/kiosk/frames/{frame['id']}").content
+    frame = client.get(f"{at}/frame").json()
+    data = client.get(f"{at}/frames/{frame['id']}").content
     drawn = np.frombuffer(data, np.uint8).reshape(frame["height_px"], frame["width_px"])
     body = {
         "id": frame["id"],
@@ -25,7 +26,7 @@ def page(client, digest=None, reason=""):
         "reason": reason,
     }
     body |= {"width_px": 4, "height_px": 3, "device_pixel_ratio": 1.0}
-    return client.post("/kiosk/report", json=body)
+    return client.post(f"{at}/report", json=body)
 
 
 def shown(screen, client, **answer):
@@ -49,8 +50,9 @@ def shown(screen, client, **answer):
 
 @pytest.fixture
 def kiosk():
-    screen = KioskScreen(timeout_s=100.0)
-    with serve_kiosk(screen) as url, httpx.Client(base_url=url.removesuffix("/kiosk/page")) as client:
+    screens = KioskScreens(timeout_s=100.0)
+    screen = screens.of(0)
+    with serve_kiosk(screens) as url, httpx.Client(base_url=url) as client:
         yield screen, client
 
 
@@ -87,3 +89,20 @@ def test_the_page_brings_no_script_but_its_own_and_strangers_are_refused(kiosk):
     assert client.get("/kiosk/page", headers={"host": "evil.example"}).status_code == 400
     assert client.get("/kiosk/frames/none").status_code == 404
     assert client.post("/kiosk/report", json={"id": "x"}).status_code == 422
+
+
+def test_each_projector_has_a_page_of_its_own():
+    screens = KioskScreens(timeout_s=100.0)
+    other = 255 - PICTURE
+    with serve_kiosk(screens) as url, httpx.Client(base_url=url) as client:
+        screens.of(0).put(PICTURE)
+        digest = screens.of(3).put(other)
+        assert page_of(0) == "/kiosk/page"
+        assert client.get(page_of(3)).text == client.get(page_of(0)).text
+        assert client.get("/kiosk/3/kiosk.js").status_code == 200
+        assert page(client, at="/kiosk/3").status_code == 204
+        assert screens.of(3).is_showing(digest)
+        assert not screens.of(0).is_showing(picture_digest(PICTURE))
+        assert page(client).status_code == 204
+        assert screens.of(0).is_showing(picture_digest(PICTURE))
+        assert client.get("/kiosk/100/frame").status_code == 422
