@@ -1,7 +1,9 @@
 """Text to typed configuration and back: strict, and an unknown key is refused with the nearest known one."""
 
+import functools
 import json
 import re
+import threading
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +17,7 @@ from app.files.toml_errors import at_place, explained
 from app.files.toml_places import places_of
 
 T = TypeVar("T")
+_MAKING = threading.Lock()
 
 
 class Strict(BaseModel):
@@ -52,7 +55,7 @@ def toml_data(text: str, source: str) -> dict[str, Any]:
 def parse(data: dict[str, Any], kind: type[T], source: str, text: str = "") -> T:
     """Validate plain data into `kind`; `text` is the TOML that it was read from. Raises BadInputError."""
     try:
-        return TypeAdapter(kind).validate_json(json.dumps(data), strict=True)
+        return adapter_of(kind).validate_json(json.dumps(data), strict=True)
     except ValidationError as error:
         raise BadInputError(explained(error, data, kind, source, places_of(text))) from None
     except TypeError as error:
@@ -66,7 +69,18 @@ def to_toml(value: Any) -> str:
 
 def to_plain(value: Any) -> Any:
     """Plain data (dicts, lists, numbers, text) of a model or a setting."""
-    return json.loads(TypeAdapter(type(value)).dump_json(value))
+    return json.loads(adapter_of(type(value)).dump_json(value))
+
+
+def adapter_of(kind: type[T]) -> TypeAdapter[T]:
+    """What checks and writes a kind. One thread at a time makes it: Python 3.11 cannot parse sources in two."""
+    with _MAKING:
+        return _made(kind)
+
+
+@functools.cache
+def _made(kind: type[T]) -> TypeAdapter[T]:
+    return TypeAdapter(kind)
 
 
 def _without_none(value: Any) -> Any:

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator, Mapping
 from itertools import combinations
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
+from app.files.toml import adapter_of
 from app.files.toml_errors import Said, said_of
 from app.files.toml_places import Path
 from app.setup.answers import (
@@ -58,7 +59,7 @@ Parts = Mapping[Path, Any]
 def mistakes_in(data: Mapping[str, Any]) -> list[Said]:
     """Every mistake in answers as they were written; empty where they describe an experiment."""
     try:
-        answers = TypeAdapter(Answers).validate_json(_json(data), strict=True)
+        answers = adapter_of(Answers).validate_json(_json(data), strict=True)
     except ValidationError as error:
         # How many supplies and outlets there are can be told of those that are wrong too.
         trapped = _trapped_air(*(_count(data.get(name)) for name in ("supply", "outlet")))
@@ -122,7 +123,7 @@ def _written_parts(data: Mapping[str, Any]) -> Parts:
     found: dict[Path, Any] = {}
     for path, (value, kind) in written.items():
         try:
-            found[path] = TypeAdapter(kind).validate_json(_json(value), strict=True)
+            found[path] = adapter_of(kind).validate_json(_json(value), strict=True)
         except ValidationError:
             found[path] = None
     return found

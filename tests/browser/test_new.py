@@ -211,6 +211,15 @@ def test_a_further_projector_is_entered_beside_its_camera_and_stays_when_the_roo
     hand.click(page.get_by_role("radio", name="A projector shows the pattern"))
     hand.click(add)
     light = page.get_by_role("group", name="projector 2", exact=True)
+    # It begins where no other device stands, at the first one's height and distance.
+    wall = page.locator("section[aria-labelledby=wall-title]")
+    first = [page.locator(f"input[name='projector.position[{axis}]']").input_value() for axis in range(3)]
+    second = [page.locator(f"input[name='light[0].position[{axis}]']").input_value() for axis in range(3)]
+    assert first[0] != second[0]
+    assert first[1:] == second[1:]
+    expect(wall.get_by_role("group", name="projector 2")).not_to_contain_text("behind")
+    light.get_by_role("button", name="Look for projector 2 at the serial ports").click()
+    expect(light).to_contain_text(re.compile("has no serial port|Ask who is there"))
     light.get_by_label("Its lens, x").fill("3")
     light.get_by_label("Its lens, y").fill("4")
     expect(light).to_contain_text("y is 4 m, at or behind the wall y_max")

@@ -7,7 +7,11 @@ from playwright.sync_api import expect
 
 from app.errors import BadInputError
 from app.experiment.captures import load_capture
+from app.experiment.printed import read_printed
 from app.rig.open import open_camera
+from app.rig.patterns import pattern_picture
+from app.sheets.pattern import choose_pattern
+from drivers.display import picture_digest
 from tests.browser.conftest import Opens, Station, snapshot
 from tests.browser.test_faults import go_to
 from tests.browser.two_views import VIEWS, two_views
@@ -90,6 +94,9 @@ def test_a_further_camera_is_added_changed_and_removed(station: Station, opens: 
     view.get_by_label("Distance to its wall").fill("3.2")
     view.get_by_label("Looks at the wall").select_option("x_min")
     view.get_by_label("Pattern on its wall").select_option("projector")
+    # It begins before its own wall, with nothing to correct.
+    expect(page.locator("button.next")).to_have_text("Create the experiment")
+    expect(view).not_to_contain_text("behind the wall")
     view.get_by_label("Projector's lens, x").fill("-1")
     expect(view).to_contain_text("at or behind the wall x_min")
     snapshot(page, "views-wrong")
@@ -114,4 +121,45 @@ def test_a_further_camera_is_added_changed_and_removed(station: Station, opens: 
     expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
     assert len(station.app.state.services.folders.open(found.name).settings.scene.views) == 1
     expect(page.locator("footer")).to_contain_text("camera ready")
+    assert watched.complaints == []
+
+
+def test_each_projector_has_its_kiosk_and_its_pattern_on_rig(station: Station, opens: Opens):
+    made = two_views(station, light="projector")
+    watched = opens(station.address)
+    page = watched.page
+    go_to(page, "Rig")
+    section = page.locator("section.projector")
+    kiosk = section.get_by_role("link", name="Kiosk page")
+    expect(kiosk).to_have_attribute("href", "/kiosk/page")
+    section.get_by_label("Projector").select_option(f"of {VIEWS[1]}: wall x_max")
+    expect(kiosk).to_have_attribute("href", "/kiosk/1/page")
+    section.get_by_role("button", name="Show", exact=True).click()
+    expect(section).to_contain_text("waiting")
+    expect(section.get_by_role("img")).to_have_attribute("src", re.compile("view=1"))
+    screens = station.app.state.services.screens
+    experiment = station.app.state.services.folders.open(made)
+    assert screens.of(1).wanted[0] == picture_digest(pattern_picture(experiment, "scene", 1))
+    assert screens.of(0).wanted[0] == ""
+    snapshot(page, "views-kiosk")
+    assert watched.complaints == []
+
+
+def test_each_wall_has_its_print_on_rig(station: Station, opens: Opens):
+    made = two_views(station)
+    folders = station.app.state.services.folders
+    for view in VIEWS:
+        choose_pattern(folders.folder(made), view)
+    watched = opens(station.address)
+    page = watched.page
+    go_to(page, "Rig")
+    for wall in ("y_max", "x_max"):
+        page.get_by_role("button", name=f"Make the pattern of {wall}").click()
+        expect(page.get_by_role("link", name=f"Pattern of {wall} (PDF)")).to_be_visible()
+    with page.expect_download() as got:
+        page.get_by_role("link", name="Pattern of x_max (PDF)").click()
+    printed = read_printed(folders.open(made), "pattern", 1)
+    assert printed is not None
+    assert got.value.path().read_bytes() == folders.open(made).file(printed.file).read_bytes()
+    snapshot(page, "views-prints")
     assert watched.complaints == []

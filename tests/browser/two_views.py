@@ -1,6 +1,7 @@
 """An experiment of two cameras for the page's tests: the packaged room's back wall and its right one."""
 
 import shutil
+from typing import Literal
 
 from app.experiment.folder import TRUTH_FILE, ExperimentSettings, create_experiment, new_folder
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
@@ -15,9 +16,11 @@ from tests.browser.conftest import Station
 VIEWS = ("camera", "camera at x_max")
 
 
-def two_views(station: Station, camera_px: int = 192) -> str:
+def two_views(
+    station: Station, camera_px: int = 192, light: Literal["texture", "projector"] = "texture"
+) -> str:
     """Make it, calibrated, among the station's experiments; return its id."""
-    options = RigOptions(camera_px=(camera_px, camera_px * 3 // 4), walls=("y_max", "x_max"))
+    options = RigOptions(camera_px=(camera_px, camera_px * 3 // 4), walls=("y_max", "x_max"), light=light)
     scene = room_scene(read_volume(SAMPLE_ROOM), options, "surveyed")
     rig = RigSettings(camera=SimulatedCameraSettings())
     settings = ExperimentSettings(title="Two cameras", information="surveyed", rig=rig, scene=scene)

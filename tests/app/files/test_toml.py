@@ -1,8 +1,10 @@
+import threading
+
 import pytest
 
 from app.errors import BadInputError
 from app.experiment.folder import ExperimentSettings
-from app.files.toml import parse, read_toml, to_plain, to_toml
+from app.files.toml import adapter_of, parse, read_toml, to_plain, to_toml
 from core.geometry import Box, looking_along_y
 from core.scene import FixedTexture, Inlet, Outlet, Patch, ProjectedPattern, Scene, View, Wall
 
@@ -92,3 +94,24 @@ def test_every_kind_of_light_and_boundary_is_told_apart_by_its_kind():
     )
     again = parse(to_plain(ExperimentSettings(scene=scene)), ExperimentSettings, source="x")
     assert again.scene == scene
+
+
+def test_what_checks_a_kind_is_made_in_many_threads_at_once():
+    # Without a lock Python 3.11 fails in a third of them: it cannot parse sources in two threads.
+    failed = []
+
+    kinds = [type(f"Kind{number}", (FixedTexture,), {}) for number in range(40)]
+
+    def make() -> None:
+        for kind in kinds:
+            try:
+                adapter_of(kind)
+            except SystemError as error:
+                failed.append(error)
+
+    threads = [threading.Thread(target=make) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert failed == []
