@@ -1,7 +1,7 @@
 """Bundle adjustment of cameras and projectors that see the same flat boards.
 
 Unknown: each device's intrinsics, its pose relative to the first device, each board's pose. Minimised:
-the sum of squared reprojection residuals over each device's own standard deviation, by
+the sum of squared reprojection residuals over each device's (and each picture's) own standard deviation, by
 Levenberg-Marquardt with OpenCV's analytic derivatives. Unlike OpenCV's routines it stops by the step
 and not after 30 iterations, lets a principal point leave the picture (office projectors: offset
 lenses), and returns the whole covariance. Cost a step: one
@@ -45,12 +45,16 @@ class Device:
 
 @dataclass(frozen=True)
 class Sighting:
-    """Board points [m] of view `view` and where device `device` has them [px]."""
+    """Board points [m] of view `view` and where device `device` has them [px].
+
+    `noise_nd` is how much noisier than its device's `sigma_px` this picture is.
+    """
 
     device: int
     view: int
     points_m: Float[np.ndarray, "points 3"]
     pixels_px: Float[np.ndarray, "points 2"]
+    noise_nd: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -145,8 +149,9 @@ def _linearise(unknowns: np.ndarray, devices: tuple[Device, ...], sightings: tup
     for sighting in sightings:
         device = now[sighting.device]
         predicted, block = _project(sighting, device, poses[sighting.view])
-        residual = (predicted - sighting.pixels_px).ravel() / device.sigma_px
-        block = block / device.sigma_px
+        sigma_px = device.sigma_px * sighting.noise_nd
+        residual = (predicted - sighting.pixels_px).ravel() / sigma_px
+        block = block / sigma_px
         own = _offset(sighting.device)
         pose = _offset(len(devices)) + 6 * sighting.view
         where = np.r_[own : own + (15 if sighting.device else 9), pose : pose + 6]
@@ -229,7 +234,8 @@ def _result(
     covariance = np.zeros((size, size))
     covariance[np.ix_(own, own)] = point.cost / degrees * inverse
     pieces = tuple(
-        r.reshape(-1, 2) * now[s.device].sigma_px for r, s in zip(point.residuals, sightings, strict=True)
+        r.reshape(-1, 2) * now[s.device].sigma_px * s.noise_nd
+        for r, s in zip(point.residuals, sightings, strict=True)
     )
     return Adjusted(now, poses, pieces, covariance, iterations, converged)
 

@@ -24,6 +24,14 @@ Motion = Float[np.ndarray, "4 4"]
 # hundred numbers (whose rms scatters by 5 %): it moved between the pictures, or is another board.
 MOVED = 3.0
 
+# A picture's own noise, and by it the fit, and by that the noise: it settles to a percent in so many rounds.
+ROUNDS = 2
+# What all pictures of a device show counts as so many numbers of each: the fewest with which the variance that is
+# expected of a picture (a scaled inverse chi-square) has itself a variance.
+POOLED = 5.0
+# Only made-up pictures fit better.
+_LEAST_PX = 1e-6
+
 
 class NothingSharedError(CalibrationError):
     """Views that nothing ties to one another."""
@@ -73,6 +81,9 @@ def tie(seats: tuple[Seat, ...], shared: tuple[SharedBoard, ...]) -> Tied:
             break
         moved.append(worst)
         shared = tuple(board for board in shared if board.name != worst)
+    for _ in range(ROUNDS):
+        draft.sightings = weighed(tuple(draft.sightings), adjusted)
+        adjusted = adjust(adjusted.devices, adjusted.poses, tuple(draft.sightings))
     of_shared = [
         residual for number in draft.shared.values() for _, residual in _of_view(draft, adjusted, number)
     ]
@@ -107,6 +118,35 @@ def _links(one: Seat, other: Seat, shared: tuple[SharedBoard, ...]) -> bool:
     if lit and one.projector and one.projector == other.projector:
         return True
     return any(one.camera in board.seen and other.camera in board.seen for board in shared)
+
+
+def weighed(sightings: tuple[Sighting, ...], adjusted: Adjusted) -> list[Sighting]:
+    """The sightings, each with the noise that its own residuals show.
+
+    Corners of a tilted or far board are found three times as badly as those of one that faces the camera: one noise
+    for all pictures of a device would give the bad ones too much weight.
+    """
+    points = dict.fromkeys(range(len(adjusted.poses)), 0)
+    of_device = [0.0] * len(adjusted.devices)
+    for sighting in sightings:
+        points[sighting.view] += len(sighting.points_m)
+        of_device[sighting.device] += len(sighting.points_m)
+    # What a board's pose and a device's unknowns take of the freedom, by how many points tell them.
+    free = [float(np.sum(device.free)) + (6.0 if n else 0.0) for n, device in enumerate(adjusted.devices)]
+    squares, freedom = [], []
+    for sighting, residual in zip(sightings, adjusted.residuals_px, strict=True):
+        count = len(sighting.points_m)
+        taken = 6.0 / points[sighting.view] + free[sighting.device] / of_device[sighting.device]
+        squares.append(float(np.sum(residual**2)))
+        freedom.append(max(count * (2.0 - taken), 0.0))
+    found = []
+    for sighting, square, own in zip(sightings, squares, freedom, strict=True):
+        mates = [n for n, other in enumerate(sightings) if other.device == sighting.device]
+        mean = sum(squares[n] for n in mates) / max(sum(freedom[n] for n in mates), 1.0)
+        sigma_px = np.sqrt((square + POOLED * mean) / (own + POOLED))
+        noise_nd = max(float(sigma_px), _LEAST_PX) / adjusted.devices[sighting.device].sigma_px
+        found.append(replace(sighting, noise_nd=noise_nd))
+    return found
 
 
 @dataclass

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from calibration import tie
+from calibration.adjustment import adjust
 from calibration.board import Chessboard
 from calibration.bundle import Bundle, from_json, to_json
 from calibration.errors import BundleError, CalibrationError
@@ -164,6 +166,48 @@ def test_a_common_board_ties_two_cameras_ten_times_as_well_as_their_walls_and_sa
     assert 0.27 < np.mean(honest) < 2.35
     assert 0.42 < np.mean(in_room) < 1.89
     assert boards == {(6, ())}
+
+
+def test_each_picture_counts_by_its_own_noise():
+    # Three of six places are found badly. One device's noise for all of them spoils what the good ones tell.
+    spread = {}
+    for rounds in (0, tie.ROUNDS):
+        errors = []
+        for seed in range(4):
+            made, rng = rig(seed), np.random.default_rng(100 + seed)
+            shared = tuple(
+                replace(board, seen={name: noisier(one, 0.13, rng) for name, one in board.seen.items()})
+                if number % 2
+                else board
+                for number, board in enumerate(made.shared)
+            )
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(tie, "ROUNDS", rounds)
+                together = adjust_together(made.seats(), shared, STATED)
+            assert together.tied.moved == ()
+            errors.append(made.relative_error(found(together)))
+        spread[rounds] = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert np.linalg.norm(spread[tie.ROUNDS][3:]) < 0.95 * np.linalg.norm(spread[0][3:])
+
+
+def test_the_noise_of_a_picture_is_read_off_its_own_residuals():
+    made = rig(1)
+    fit = made.seats()[0].model.camera
+    bad = replace(
+        fit.sightings[2],
+        pixels_px=np.array(noisier(made.records[0].boards[2], 0.14, np.random.default_rng(3)).camera_px),
+    )
+    sightings = (*fit.sightings[:2], bad, *fit.sightings[3:])
+    adjusted = adjust(fit.adjusted.devices, fit.adjusted.poses, sightings)
+    noise_px = [one.noise_nd * adjusted.devices[0].sigma_px for one in tie.weighed(sightings, adjusted)]
+    # 108 numbers tell a standard deviation to 7 %; a little of the bad one's share goes to all.
+    assert noise_px[2] == pytest.approx(np.hypot(CORNER_PX, 0.14), rel=0.25)
+    assert np.delete(noise_px, 2) == pytest.approx(np.full(8, CORNER_PX), rel=0.3)
+
+
+def noisier(board: SeenBoard, by_px: float, rng) -> SeenBoard:
+    pixels = np.array(board.camera_px)
+    return replace(board, camera_px=rows_of(pixels + by_px * rng.standard_normal(pixels.shape)))
 
 
 def test_nothing_shared_is_refused_with_what_to_do():
