@@ -473,6 +473,8 @@ interface Mark {
   at: Vector;
   /** A thing's name, an axis' name, or a tick of an axis. */
   kind: "name" | "axis" | "tick";
+  /** What an axis' name is the name of: the name is shown where this is, though it may stand beyond the edge. */
+  of?: Vector;
 }
 
 /** Words over the picture that stay at their places in the room, inside the picture, and not on one another. */
@@ -516,11 +518,15 @@ class Marks {
 
   put(): void {
     const seen = this.seen();
+    const [wide, tall] = [this.place.clientWidth, this.place.clientHeight];
     const labels = this.kept.map(({ mark, width, height }) => {
-      const [x, y] = seen(mark.at) ?? [NaN, NaN];
+      let [x, y] = seen(mark.at) ?? [NaN, NaN];
+      const [of_x, of_y] = (mark.of && seen(mark.of)) ?? [NaN, NaN];
+      if (of_x >= 0 && of_x <= wide && of_y >= 0 && of_y <= tall)
+        [x, y] = [Math.max(0, Math.min(wide, x)), Math.max(0, Math.min(tall, y))];
       return { x, y, width, height, fixed: mark.kind === "tick" };
     });
-    this.places = placed(labels, this.place.clientWidth, this.place.clientHeight);
+    this.places = placed(labels, wide, tall);
     this.kept.forEach(({ element }, n) => {
       const at = this.places[n];
       element.hidden = !at;
@@ -557,9 +563,9 @@ function axisMarks(axes: Grid["axes"]): Mark[] {
   const ticks = (places: number[], at: (value: number) => Vector) =>
     ticksOf(places).map((one): Mark => ({ text: one.label, at: at(one.value), kind: "tick" }));
   return [
-    { text: "x [m]", at: [last(x), front - 2.6 * off, floor - 2.6 * off], kind: "axis" },
-    { text: "y [m]", at: [right + 2.6 * off, last(y), floor - 2.6 * off], kind: "axis" },
-    { text: "z [m]", at: [left - 2.8 * off, back + 2.8 * off, last(z)], kind: "axis" },
+    { text: "x [m]", at: [last(x), front - 2.6 * off, floor - 2.6 * off], kind: "axis", of: [last(x), front, floor] },
+    { text: "y [m]", at: [right + 2.6 * off, last(y), floor - 2.6 * off], kind: "axis", of: [right, last(y), floor] },
+    { text: "z [m]", at: [left - 2.8 * off, back + 2.8 * off, last(z)], kind: "axis", of: [left, back, last(z)] },
     ...ticks(x, (value) => [value, front - off, floor - off]),
     ...ticks(y, (value) => [right + off, value, floor - off]),
     ...ticks(z, (value) => [left - off, back + off, value]),
