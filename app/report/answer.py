@@ -91,7 +91,7 @@ _TILES = {
 
 
 @dataclass(frozen=True)
-class Tile:
+class AtAGlance:
     """One figure to be seen at a glance: its number with its unit, its interval, its name, and what it means."""
 
     value: str
@@ -100,14 +100,14 @@ class Tile:
     means: str
 
 
-def tiles(finding: Finding) -> tuple[Tile, ...]:
+def tiles(finding: Finding) -> tuple[AtAGlance, ...]:
     """The figures that a reader looks for first. Raises SettingError for a room without an occupied zone."""
     figures = {one.key: one for one in finding.indoor.quantities}
     made = []
     for key, name in _TILES.items():
         if key in figures:
             _, value, interval = line_of(figures[key])
-            made.append(Tile(value, "" if interval == "-" else interval, name, meaning(figures[key])))
+            made.append(AtAGlance(value, "" if interval == "-" else interval, name, meaning(figures[key])))
     return tuple(made)
 
 

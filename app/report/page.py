@@ -16,7 +16,7 @@ from app.errors import BadInputError, explained
 from app.experiment.folder import Experiment, open_experiment
 from app.experiment.found import found_in
 from app.files.durable import write_text
-from app.report.answer import Tile, advice, assumed, summary, tiles
+from app.report.answer import AtAGlance, advice, assumed, summary, tiles
 from app.report.beside import SIGMAS, places, rows
 from app.report.figures import (
     as_data_uri,
@@ -128,7 +128,7 @@ def _sections(finding: Finding) -> list[Section]:
     ]
 
 
-def _tiles(finding: Finding) -> tuple[Tile, ...]:
+def _tiles(finding: Finding) -> tuple[AtAGlance, ...]:
     """Figures to be seen at a glance; a room without an occupied zone says so with its table."""
     try:
         return tiles(finding)

@@ -26,7 +26,7 @@ from reportlab.platypus import (
 
 from app.errors import explained
 from app.experiment.folder import open_experiment
-from app.report.answer import Tile, advice, assumed, summary, tiles
+from app.report.answer import AtAGlance, advice, assumed, summary, tiles
 from app.report.beside import SIGMAS, places, rows
 from app.report.figures import as_png, slices_figure, volume_figure
 from app.report.finding import Finding, read_finding
@@ -180,7 +180,7 @@ def _glance(finding: Finding) -> Iterable[Flowable]:
     yield table
 
 
-def _tile(one: Tile) -> list[Flowable]:
+def _tile(one: AtAGlance) -> list[Flowable]:
     return [
         _text(one.value, _NUMBER),
         _text(one.interval, _SMALL),
