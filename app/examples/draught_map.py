@@ -41,7 +41,7 @@ def draught_map(finding: Finding, picture: Path) -> str:
         for part in (draught.values, draught.low, draught.high)
     )
     plans = [
-        FloorMap(title, "%", solution.x_m, solution.y_m, values, "gouraud")
+        FloorMap(title, "%", solution.x_m, solution.y_m, values)
         for title, values in (("people bothered by draught", found), ("at most (95 %)", high))
     ]
     picture.write_bytes(as_png(plans_figure(plans)))

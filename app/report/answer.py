@@ -1,6 +1,7 @@
 """The answer of a report: three sentences without jargon, and what would make it surer."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,25 +11,18 @@ from app.experiment.found import Found, found_in
 from app.report.finding import Finding
 from app.report.indoor import Quantity
 from app.report.indoor import told as line_of
+from app.report.meaning import MIXED, beside, category, meaning, warmth
 from core.result import Outcome
 from core.scene import PointSensors, Wall
 
-# Shares of people bothered by draught: what ISO 7730 takes for its categories A, B and C.
-_CATEGORIES = (
-    (10.0, "few people (category A)"),
-    (20.0, "some people (category B)"),
-    (30.0, "many people (category C)"),
-)
-# The air change efficiency of a room that is mixed at once.
-_MIXED_PERCENT = 50.0
 # A camera of fewer pixels, or a mean of fewer frames, sees less than a usual one.
 _PIXELS, _FRAMES = 2000, 100
 
 
 def summary(finding: Finding) -> tuple[str, ...]:
-    """Three sentences: how warm and how fast the air is, what that means for people, and how sure it is."""
+    """Three sentences: what the air is like for people, how the room is ventilated, and how sure that is."""
     made = []
-    for say in (_air, _people, _sure):
+    for say in (_people, _ventilation, _sure):
         try:
             made.append(say(finding))
         except Exception as error:  # a result without one of its sentences is still a result
@@ -47,43 +41,74 @@ def assumed(manifest: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(sentence for sentence in manifest.get("assumed", ()) if sentence not in elsewhere)
 
 
-def _air(finding: Finding) -> str:
-    figures = {one.key: one for one in finding.indoor.quantities}
-    levels_k = np.asarray(np.nanmean(finding.solution.temperature_k.astype(np.float64), axis=(0, 1)))
-    higher = f"{abs(levels_k[-1] - levels_k[0]):.1f} K {'warmer' if levels_k[-1] > levels_k[0] else 'colder'}"
-    warm = f"Where people are the air is {_value(figures['temperature_mean'], '°C')} on the mean"
-    moving = ""
-    if "speed_mean" in figures:
-        moving = f" and moves at {_value(figures['speed_mean'], 'm/s')}"
-    return f"{warm}{moving}; at the ceiling it is {higher} than at the floor."
-
-
 def _people(finding: Finding) -> str:
     figures = {one.key: one for one in finding.indoor.quantities}
-    if "draught_rate_p95" not in figures:
-        return "Its velocity was not found, so nothing is told of draught and ventilation."
-    draught = figures["draught_rate_p95"]
-    who = next((words for limit, words in _CATEGORIES if draught.value < limit), "most people")
-    felt = (
-        f"Its draught bothers {who}: {_value(draught, '%')} in the draughtiest twentieth of the occupied zone"
-    )
-    if "air_changes" not in figures:
-        return f"{felt}."
-    changes, efficiency = figures["air_changes"], figures["efficiency"]
+    warm = f"Where people are the air is {_value(figures['temperature_mean'], '°C')} on the mean"
+    if "speed_mean" not in figures:
+        return f"{warm}."
+    vote, doubting, draught = figures["pmv"], figures["ppd"], figures["draught_rate_p95"]
     return (
-        f"{felt}; the supply changes the air {_value(changes, 'times an hour')} and {ventilates(efficiency)}."
+        f"{warm} and moves at {_value(figures['speed_mean'], 'm/s')}: people find it {warmth(vote.value)} "
+        f"({line_of(doubting)[1]} are dissatisfied), and where draught is worst it bothers "
+        f"{_value(draught, '% of them')}, {category(draught)} of ISO 7730."
     )
+
+
+def _ventilation(finding: Finding) -> str:
+    figures = {one.key: one for one in finding.indoor.quantities}
+    upwards = figures["floor_to_ceiling"]
+    higher = f"{abs(upwards.value):.1f} K {'warmer' if upwards.value > 0 else 'colder'}"
+    ceiling = f"at the ceiling it is {higher} than at the floor"
+    if "speed_mean" not in figures:
+        return f"{ceiling.capitalize()}; its velocity was not found, so nothing is told of draught and ventilation."
+    if "air_changes" not in figures:
+        return f"{ceiling.capitalize()}; how its air is changed is not known."
+    changes, efficiency = figures["air_changes"], figures["efficiency"]
+    return f"The supply changes the air {_value(changes, 'times an hour')} and {ventilates(efficiency)}; {ceiling}."
 
 
 def ventilates(efficiency: Quantity) -> str:
     """Better or worse than a mixed room, where its whole interval says so."""
     low, high = (efficiency.value if end is None else end for end in (efficiency.low, efficiency.high))
-    known = f"(efficiency {_value(efficiency, '%')}, mixed: {_MIXED_PERCENT:g} %)"
-    if low > _MIXED_PERCENT:
-        return f"ventilates better than a room that is mixed at once {known}"
-    if high < _MIXED_PERCENT:
-        return f"ventilates worse than a room that is mixed at once {known}"
-    return f"ventilates like a room that is mixed at once, as far as can be told {known}"
+    mixed = MIXED["efficiency"]
+    side = beside(low, high, mixed, "better than", "worse than", "like")
+    known = "" if side != "like" else ", as far as can be told"
+    return (
+        f"ventilates {side} a room that is mixed at once{known} "
+        f"(efficiency {_value(efficiency, '%')}, mixed: {mixed:g} %)"
+    )
+
+
+# What a reader looks for first; the rest is in the table.
+_TILES = {
+    "temperature_mean": "air where people are",
+    "speed_mean": "speed there",
+    "pmv": "warmth vote (PMV)",
+    "draught_rate_p95": "draught rate, 95th percentile",
+    "air_changes": "air changes",
+    "efficiency": "air change efficiency",
+}
+
+
+@dataclass(frozen=True)
+class AtAGlance:
+    """One figure to be seen at a glance: its number with its unit, its interval, its name, and what it means."""
+
+    value: str
+    interval: str
+    name: str
+    means: str
+
+
+def tiles(finding: Finding) -> tuple[AtAGlance, ...]:
+    """The figures that a reader looks for first. Raises SettingError for a room without an occupied zone."""
+    figures = {one.key: one for one in finding.indoor.quantities}
+    made = []
+    for key, name in _TILES.items():
+        if key in figures:
+            _, value, interval = line_of(figures[key])
+            made.append(AtAGlance(value, "" if interval == "-" else interval, name, meaning(figures[key])))
+    return tuple(made)
 
 
 def _sure(finding: Finding) -> str:
@@ -96,7 +121,9 @@ def _sure(finding: Finding) -> str:
         spread = np.linalg.norm(np.asarray(solution.velocity_std_m_s), axis=-1)
         parts.append(f"velocity to ± {1.96 * float(np.median(spread)):.2f} m/s")
     sure = (
-        f"At a usual place it is sure of {' and '.join(parts)} (95 %)." if parts else "It has no intervals."
+        f"At a usual place these are known: {' and '.join(parts)} (95 %)."
+        if parts
+        else "It has no intervals."
     )
     if finding.scores is None:
         return f"{sure} There is no truth to compare with; what was taken on trust is listed below."

@@ -4,15 +4,16 @@ import base64
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from app.experiment.found import Found
 from core.comfort import CELSIUS_K
+from core.geometry import Vector3
 from core.problem import ShiftMeasurement
 from core.result import Solution
 
@@ -26,14 +27,19 @@ _MARK = "#ff7f0e"
 
 @dataclass(frozen=True)
 class FloorMap:
-    """A map seen from above: values at vertices (gouraud) or between the edges of cells (flat)."""
+    """A map seen from above, of values at vertices.
+
+    `ends` of its scale: from zero to the largest value without them. `marks` are values of the scale with a word.
+    """
 
     title: str
     label: str
     x_m: np.ndarray
     y_m: np.ndarray
     values: np.ndarray
-    shading: Literal["gouraud", "flat"]
+    ends: tuple[float, float] | None = None
+    colours: str = SEQUENTIAL
+    marks: tuple[tuple[float, str], ...] = ()
 
 
 def as_png(figure: Figure, dpi: int = 110) -> bytes:
@@ -50,7 +56,8 @@ def as_data_uri(figure: Figure) -> str:
 
 def images_figure(reference: np.ndarray, flow: np.ndarray) -> Figure:
     """Reference, flow, and their difference, which is all that the eye can be shown of it."""
-    figure = Figure(figsize=(13, 3.9), layout="constrained")
+    tall_in = 3.9 * reference.shape[0] / reference.shape[1] + 0.4
+    figure = Figure(figsize=(13, tall_in), layout="constrained")
     axes = figure.subplots(1, 3)
     step = max(1, reference.shape[1] // 800)
     small = [image[::step, ::step] for image in (reference, flow)]
@@ -117,10 +124,18 @@ def shift_figure(shift: ShiftMeasurement) -> Figure:
     return figure
 
 
+def _three_planes(solution: Solution) -> tuple[Figure, list[Axes]]:
+    """A figure with a place for each middle plane, a metre as long in all of them."""
+    x_m, y_m, z_m = (float(np.ptp(axis)) for axis in (solution.x_m, solution.y_m, solution.z_m))
+    widths = (x_m, y_m, x_m)
+    tall_in = 10.2 * max(z_m, y_m) / sum(widths) + 0.9
+    figure = Figure(figsize=(13, min(max(tall_in, 2.4), 6.0)), layout="constrained")
+    return figure, list(figure.subplots(1, 3, gridspec_kw={"width_ratios": widths}))
+
+
 def slices_figure(solution: Solution) -> Figure:
     """Temperature on three middle planes with lines of equal values, and arrows of velocity where it is known."""
-    figure = Figure(figsize=(13, 4.2), layout="constrained")
-    axes = figure.subplots(1, 3)
+    figure, axes = _three_planes(solution)
     # As a file keeps it: lines of equal values would follow the last digits.
     celsius = np.asarray(solution.temperature_k, np.float32) - np.float32(CELSIUS_K)
     low, high = np.nanpercentile(celsius[1:-1, 1:-1, 1:-1], [0.5, 99.5])
@@ -135,21 +150,19 @@ def slices_figure(solution: Solution) -> Figure:
 
 def error_figure(solution: Solution, error_k: np.ndarray) -> Figure:
     """Temperature minus truth on the same planes, on the solution's vertices."""
-    figure = Figure(figsize=(13, 4.2), layout="constrained")
-    axes = figure.subplots(1, 3)
+    figure, axes = _three_planes(solution)
     limit = float(np.nanpercentile(np.abs(error_k[1:-1, 1:-1, 1:-1]), 98)) or 1e-6
     drawn = [
         _slice(axis, solution, error_k, normal, DIVERGING, -limit, limit, arrows=False)
         for axis, normal in zip(axes, (1, 0, 2), strict=True)
     ]
-    figure.colorbar(drawn[0], ax=axes, label="T - true T [K]", shrink=0.85)
+    figure.colorbar(drawn[0], ax=axes, label="found minus true [K]", shrink=0.85)
     return figure
 
 
 def volume_figure(solution: Solution, values: np.ndarray, label: str, highest: float | None = None) -> Figure:
     """A volume from zero upwards on the three middle planes."""
-    figure = Figure(figsize=(13, 4.2), layout="constrained")
-    axes = figure.subplots(1, 3)
+    figure, axes = _three_planes(solution)
     limit = highest or float(np.nanpercentile(values[1:-1, 1:-1, 1:-1], 99)) or 1e-6
     drawn = [
         _slice(axis, solution, values, normal, SEQUENTIAL, 0.0, limit, arrows=False)
@@ -159,23 +172,42 @@ def volume_figure(solution: Solution, values: np.ndarray, label: str, highest: f
     return figure
 
 
-def plans_figure(plans: Sequence[FloorMap]) -> Figure:
-    """Maps seen from above, side by side, each with its own scale from zero."""
+def plans_figure(plans: Sequence[FloorMap], zone_m: Sequence[Vector3] | None = None) -> Figure:
+    """Maps seen from above, side by side, each with its own scale; dashed: the zone between two corners."""
     across_in = 13 / len(plans)
     tall = max(float(np.ptp(plan.y_m) / np.ptp(plan.x_m)) for plan in plans)
-    figure = Figure(figsize=(13, min(0.65 * across_in * tall + 1.2, 4.6)), layout="constrained")
+    figure = Figure(figsize=(13, min(0.8 * across_in * tall + 1.3, 4.8)), layout="constrained")
     axes = figure.subplots(1, len(plans), squeeze=False)[0]
     for axis, plan in zip(axes, plans, strict=True):
-        most = float(np.nanmax(plan.values)) or 1e-6
+        low, high = plan.ends or (0.0, float(np.nanmax(plan.values)) or 1e-6)
         drawn = axis.pcolormesh(
-            plan.x_m, plan.y_m, plan.values.T, cmap=SEQUENTIAL, vmin=0.0, vmax=most, shading=plan.shading
+            plan.x_m, plan.y_m, plan.values.T, cmap=plan.colours, vmin=low, vmax=high, shading="gouraud"
         )
+        if zone_m is not None:
+            (x0, y0, _), (x1, y1, _) = zone_m
+            for style in ({"ec": "white", "lw": 2.2, "alpha": 0.7}, {"ec": "#222222", "lw": 1.1, "ls": "--"}):
+                axis.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, **style))
         axis.set_aspect("equal")
         axis.set_title(plan.title)
         axis.set_xlabel("x [m]")
         axis.set_ylabel("y [m]")
-        figure.colorbar(drawn, ax=axis, label=plan.label, shrink=0.8)
+        bar = figure.colorbar(
+            drawn,
+            ax=axis,
+            label=plan.label,
+            orientation="horizontal",
+            shrink=0.9,
+            extend=_beyond(plan, low, high),
+        )
+        if plan.marks:
+            bar.set_ticks([value for value, _ in plan.marks], labels=[word for _, word in plan.marks])
     return figure
+
+
+def _beyond(plan: FloorMap, low: float, high: float) -> str:
+    """Which ends of a scale values lie beyond, as Matplotlib says it."""
+    ends = float(np.nanmin(plan.values)) < low, float(np.nanmax(plan.values)) > high
+    return {(True, True): "both", (True, False): "min", (False, True): "max"}.get(ends, "neither")
 
 
 def _slice(

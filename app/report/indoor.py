@@ -93,7 +93,7 @@ NAMES: Mapping[str, tuple[str, str]] = {
     "pmv": ("predicted mean vote (PMV), mean", ""),
     "ppd": ("predicted dissatisfied (PPD), mean", "%"),
     "adpi": ("air diffusion performance (ADPI)", "%"),
-    "flow": ("supply air", "m3/h"),
+    "flow": ("supply air", "m³/h"),
     "air_changes": ("air changes", "1/h"),
     "nominal_time": ("volume over flow", "min"),
     "mean_age": ("age of the air, mean of the room", "min"),
@@ -102,7 +102,7 @@ NAMES: Mapping[str, tuple[str, str]] = {
     "source_effectiveness": ("removal of the source's air (1: mixed)", ""),
     "supply_temperature": ("supply air, temperature", "°C"),
     "exhaust_temperature": ("exhaust air, temperature", "°C"),
-    "heat": ("heat that the supply air brings", "W"),
+    "heat": ("heat that the air leaves in the room", "W"),
 }
 _BY_AGE = ("mean_age", "efficiency", "zone_index", "source_effectiveness")
 NO_VELOCITY = (
@@ -303,7 +303,7 @@ def _quantity(key: str, value: float, drawn: list[float]) -> Quantity:
 _BOUNDS = {
     "%": (0.0, 100.0),
     "m/s": (0.0, np.inf),
-    "m3/h": (0.0, np.inf),
+    "m³/h": (0.0, np.inf),
     "1/h": (0.0, np.inf),
     "m": (0.0, np.inf),
 }
@@ -311,7 +311,7 @@ _BOUNDS = {
 
 def _jet_name(key: str) -> tuple[str, str]:
     kind, number = key.split("_")
-    told = f"throw to {TERMINAL_M_S:g} m/s" if kind == "throw" else "drop at its throw"
+    told = f"throw to {TERMINAL_M_S:g} m/s" if kind == "throw" else "drop at its throw (below 0: it rises)"
     return f"supply {number}, {told}", "m"
 
 

@@ -16,8 +16,8 @@ from app.errors import BadInputError, explained
 from app.experiment.folder import Experiment, open_experiment
 from app.experiment.found import found_in
 from app.files.durable import write_text
-from app.report.answer import advice, assumed, summary
-from app.report.beside import places, rows
+from app.report.answer import AtAGlance, advice, assumed, summary, tiles
+from app.report.beside import SIGMAS, places, rows
 from app.report.figures import (
     as_data_uri,
     error_figure,
@@ -30,6 +30,7 @@ from app.report.figures import (
 from app.report.finding import Finding, read_finding
 from app.report.indoor import told
 from app.report.maps_figure import maps_figure
+from app.report.meaning import meaning
 from app.report.room_figure import room_figure
 from app.report.tables import facts, origin, score_rows
 from app.volume.file import RoomVolume
@@ -38,6 +39,7 @@ from core.displacement import standard_deviation_px
 from core.drift import nearly_still
 from core.occupied import HEAD_M
 from core.result import Solution
+from core.setting import SettingError
 
 Rows = Iterable[tuple[str, ...]]
 
@@ -52,12 +54,13 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with its pictures, its table and notes on them, and why what is missing is missing."""
+    """A heading with its pictures, its table, a list and notes, and why what is missing is missing."""
 
     title: str
     figures: tuple[Picture, ...] = ()
     heads: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
+    points: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
 
@@ -90,8 +93,11 @@ def render_report(finding: Finding) -> str:
         experiment=experiment.folder.name,
         result=finding.name,
         preset=manifest.get("preset", "unknown"),
-        created=manifest.get("created", "at an unknown time"),
+        created=str(manifest.get("created", "at an unknown time"))
+        .replace("T", " ")
+        .replace("+00:00", " UTC"),
         sentences=summary(finding),
+        tiles=_tiles(finding),
         sections=_sections(finding),
     )
 
@@ -101,24 +107,41 @@ def _sections(finding: Finding) -> list[Section]:
     made = [
         _air(finding),
         _indoor(finding),
+        Section("What to do to know better", points=advice(finding)),
         _found(finding),
-        _listed("What to do to know better", lambda: ((sentence,) for sentence in advice(finding))),
-        _listed(
-            "Against the truth", lambda: score_rows(finding), heads=("quantity", "error", "trivial answers")
-        ),
+        _drawn("How sure it is", lambda: _known(finding.solution)),
+        _compared(finding),
         _drawn("What the camera saw", lambda: _images(finding)),
         _drawn("How far the pattern moved", lambda: _shifts(finding)),
         *(
             _drawn(f"Calibration: {view.name}", lambda name=view.name: _calibration(finding.experiment, name))
             for view in finding.experiment.settings.scene.views
         ),
-        _listed("What was assumed", lambda: ((sentence,) for sentence in assumed(manifest))),
+        Section("What was assumed", points=assumed(manifest)),
         _listed("What was known, and of what", lambda: facts(finding.experiment)),
         _listed("Where this came from", lambda: origin(manifest)),
     ]
     return [
-        section for section in made if section.figures or section.rows or section.notes or section.missing
+        section
+        for section in made
+        if section.figures or section.rows or section.points or section.notes or section.missing
     ]
+
+
+def _tiles(finding: Finding) -> tuple[AtAGlance, ...]:
+    """Figures to be seen at a glance; a room without an occupied zone says so with its table."""
+    try:
+        return tiles(finding)
+    except SettingError:
+        return ()
+
+
+def _compared(finding: Finding) -> Section:
+    """The error on the planes and in numbers, where there is a truth."""
+    title = "Against the truth"
+    table = _listed(title, lambda: score_rows(finding), heads=("quantity", "error", "trivial answers"))
+    drawn = _drawn(title, lambda: _errors(finding))
+    return replace(table, figures=drawn.figures, missing=table.missing + drawn.missing)
 
 
 def _drawn(title: str, *parts: Callable[[], Iterable[Picture]]) -> Section:
@@ -189,13 +212,11 @@ def _shifts(finding: Finding) -> Iterable[Picture]:
 
 
 def _air(finding: Finding) -> Section:
-    """The room as a picture, what was found at a few places, planes, and how sure it is."""
+    """The room as a picture, planes, and what was found at a few places with its interval."""
     pictures = _drawn(
         "The air",
         lambda: _room(finding),
         lambda: _planes(finding),
-        lambda: _known(finding.solution),
-        lambda: _errors(finding),
     )
     scene = finding.experiment.settings.scene
     table = _listed(
@@ -229,17 +250,17 @@ def _planes(finding: Finding) -> Iterable[Picture]:
 def _known(solution: Solution) -> Iterable[Picture]:
     """How sure the solver is, and where the measurements rather than the model speak."""
     if solution.temperature_std_k is not None:
-        figure = volume_figure(solution, solution.temperature_std_k, "one sigma of T [K]")
-        yield Picture(as_data_uri(figure), "Standard deviation of the temperature.")
+        figure = volume_figure(solution, SIGMAS * solution.temperature_std_k, "± K (95 %)")
+        yield Picture(as_data_uri(figure), "Temperature: half of its 95 % interval.")
     if solution.velocity_std_m_s is not None:
-        size = np.linalg.norm(solution.velocity_std_m_s, axis=-1)
-        figure = volume_figure(solution, size, "one sigma of u [m/s]")
-        yield Picture(as_data_uri(figure), "Standard deviation of the velocity.")
+        size = SIGMAS * np.linalg.norm(solution.velocity_std_m_s, axis=-1)
+        figure = volume_figure(solution, size, "± m/s (95 %)")
+        yield Picture(as_data_uri(figure), "Velocity: half of its 95 % interval.")
     if solution.informed is not None:
-        figure = volume_figure(solution, solution.informed, "informed [1]", highest=1.0)
+        figure = volume_figure(solution, solution.informed, "share measured", highest=1.0)
         yield Picture(
             as_data_uri(figure),
-            "Share of the temperature's prior variance that the measurements removed: at 0 the model "
+            "How much of the temperature's uncertainty the measurements removed: at 1 they tell it, at 0 the model "
             "speaks alone.",
         )
 
@@ -255,8 +276,12 @@ def _errors(finding: Finding) -> Iterable[Picture]:
 
 def _indoor(finding: Finding) -> Section:
     """Figures and maps for people and for ventilation."""
-    heads = ("quantity", "value", "95 %")
-    table = _listed("People and ventilation", lambda: map(told, finding.indoor.quantities), heads)
+    heads = ("quantity", "value", "95 %", "what it means")
+    table = _listed(
+        "People and ventilation",
+        lambda: ((*told(one), meaning(one)) for one in finding.indoor.quantities),
+        heads,
+    )
     if not table.missing:
         table = replace(table, notes=(*finding.indoor.missing, *finding.indoor.notes))
     if finding.solution.velocity_m_s is None:
@@ -269,7 +294,8 @@ def _maps(finding: Finding) -> Iterable[Picture]:
     """Draught and age at the height of sitting people's heads."""
     yield Picture(
         as_data_uri(maps_figure(finding)),
-        f"Seen from above, {HEAD_M:g} m over the floor: draught rate, the upper end of its interval, age of the air.",
+        f"Seen from above, {HEAD_M:g} m over the floor; dashed: the zone where people are. A, B and C: where the "
+        "categories of ISO 7730 end.",
     )
 
 

@@ -5,11 +5,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from xml.sax.saxutils import escape
 
+import numpy as np
 from matplotlib.figure import Figure
 from reportlab.lib import colors
 from reportlab.lib.pagesizes import A4
 from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
+from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import (
     Flowable,
     Image,
@@ -24,14 +26,16 @@ from reportlab.platypus import (
 
 from app.errors import explained
 from app.experiment.folder import open_experiment
-from app.report.answer import advice, assumed, summary
-from app.report.beside import places, rows
+from app.report.answer import AtAGlance, advice, assumed, summary, tiles
+from app.report.beside import SIGMAS, places, rows
 from app.report.figures import as_png, slices_figure, volume_figure
 from app.report.finding import Finding, read_finding
 from app.report.indoor import told
 from app.report.maps_figure import maps_figure
+from app.report.meaning import meaning
 from app.report.room_figure import room_figure
 from app.report.tables import facts, score_rows
+from core.setting import SettingError
 
 # A frame has 6 points of padding on each side.
 _WIDTH = A4[0] - 30 * mm - 12
@@ -42,6 +46,7 @@ _CELL = ParagraphStyle("cell", parent=_TEXT, fontSize=7.6, leading=9.2)
 _HEAD = ParagraphStyle(
     "head", parent=_TEXT, fontName="Helvetica-Bold", fontSize=11, leading=14, spaceBefore=5
 )
+_NUMBER = ParagraphStyle("number", parent=_HEAD, fontSize=12.5, leading=16, spaceBefore=0)
 _TITLE = ParagraphStyle("title", parent=_HEAD, fontSize=16, leading=20)
 # Of the figures for people and ventilation, those that a page has place for.
 _FIGURES = (
@@ -76,27 +81,44 @@ def write_pdf(finding: Finding, path: Path) -> None:
         KeepInFrame(width, height, list(page), mode="shrink")
         for page in (_first(finding, title), _second(finding))
     )
-    document.build([first, PageBreak(), second])
+    foot = f"airlens · {title} · result {finding.name}"
+    document.build(
+        [first, PageBreak(), second],
+        onFirstPage=lambda canvas, _: _foot(canvas, f"{foot} · page 1 of 2"),
+        onLaterPages=lambda canvas, _: _foot(canvas, f"{foot} · page 2 of 2"),
+    )
+
+
+def _foot(canvas: Canvas, words: str) -> None:
+    """What a page belongs to, below it."""
+    canvas.setFont(_SMALL.fontName, _SMALL.fontSize)
+    canvas.setFillColor(_SMALL.textColor)
+    canvas.drawString(15 * mm + 6, 8 * mm, words)
 
 
 def _first(finding: Finding, title: str) -> Iterable[Flowable]:
     manifest = finding.manifest
     made = str(manifest.get("created", "")).replace("T", " ")[:16]
     yield _text(title, _TITLE)
-    yield _text(f"{made} · {manifest.get('preset', '')} · {finding.name} · airlens", _SMALL)
+    yield _text(f"The air in the room · {made} · preset {manifest.get('preset', 'unknown')}", _SMALL)
     yield Spacer(1, 2 * mm)
     for sentence in summary(finding):
         yield _text(sentence, _LEAD)
-    yield from _picture(lambda: room_figure(finding.solution, finding.experiment.settings.scene), 0.98)
+    yield Spacer(1, 1 * mm)
+    yield from _glance(finding)
+    yield Spacer(1, 2 * mm)
+    yield from _picture(lambda: room_figure(finding.solution, finding.experiment.settings.scene), 0.68)
     yield from _table(
         ("place", "temperature, 95 %", "true", "speed, 95 %", "true"),
         lambda: rows(places(finding.solution, finding.experiment.settings.scene, finding.truth)),
         (0.38, 0.19, 0.12, 0.19, 0.12),
     )
+    yield from _picture(lambda: slices_figure(finding.solution), 0.9)
     yield from _picture(lambda: maps_figure(finding), 1.0)
     yield _text(
-        "Maps seen from above, 1.1 m over the floor, the height of sitting people's heads. Truths are known of "
-        "simulated rooms only.",
+        "Planes: temperature and velocity. Maps: seen from above, 1.1 m over the floor, the height of sitting "
+        "people's heads; dashed: the zone where people are; A, B and C: where the categories of ISO 7730 end. "
+        "Truths are known of simulated rooms only.",
         _SMALL,
     )
 
@@ -104,18 +126,22 @@ def _first(finding: Finding, title: str) -> Iterable[Flowable]:
 def _second(finding: Finding) -> Iterable[Flowable]:
     solution = finding.solution
     yield _text("People and ventilation", _HEAD)
-    yield from _table(("quantity", "value", "95 %"), lambda: _figures(finding), (0.5, 0.2, 0.3))
-    yield _text("How sure it is", _HEAD)
-    yield from _picture(lambda: slices_figure(solution), 0.66)
-    if solution.temperature_std_k is not None:
-        deviation = solution.temperature_std_k
-        yield from _picture(lambda: volume_figure(solution, deviation, "one sigma of T [K]"), 0.66)
     yield from _table(
-        ("quantity", "error", "trivial answers"), lambda: score_rows(finding), (0.4, 0.15, 0.45)
+        ("quantity", "value", "95 %", "what it means"), lambda: _figures(finding), (0.38, 0.13, 0.2, 0.29)
     )
     yield _text("What to do to know better", _HEAD)
     for sentence in advice(finding)[:_ADVICE]:
         yield _text(f"• {_short(sentence)}", _TEXT)
+    yield _text("How sure it is: half of the 95 % interval of temperature, and of velocity", _HEAD)
+    deviation, spread = solution.temperature_std_k, solution.velocity_std_m_s
+    if deviation is not None:
+        yield from _picture(lambda: volume_figure(solution, SIGMAS * deviation, "± K (95 %)"), 0.68)
+    if spread is not None:
+        size = SIGMAS * np.linalg.norm(spread, axis=-1)
+        yield from _picture(lambda: volume_figure(solution, size, "± m/s (95 %)"), 0.68)
+    yield from _table(
+        ("against the truth", "error", "trivial answers"), lambda: score_rows(finding), (0.4, 0.12, 0.48)
+    )
     yield _text("Method and rig", _HEAD)
     yield _text(_METHOD, _TEXT)
     known = "; ".join(f"{name}: {words}" for name, words in facts(finding.experiment))
@@ -130,9 +156,42 @@ def _second(finding: Finding) -> Iterable[Flowable]:
     )
 
 
+def _glance(finding: Finding) -> Iterable[Flowable]:
+    """The figures that a reader looks for first, side by side; nothing where there are none."""
+    try:
+        made = tiles(finding)
+    except SettingError:  # the table says why
+        return
+    table = Table([[_tile(one) for one in made]], colWidths=[_WIDTH / len(made)] * len(made))
+    line = colors.HexColor("#c8ced6")
+    table.setStyle(
+        TableStyle(
+            [
+                ("BOX", (0, 0), (-1, -1), 0.6, line),
+                ("INNERGRID", (0, 0), (-1, -1), 0.6, line),
+                ("VALIGN", (0, 0), (-1, -1), "TOP"),
+                ("LEFTPADDING", (0, 0), (-1, -1), 4),
+                ("RIGHTPADDING", (0, 0), (-1, -1), 2),
+                ("TOPPADDING", (0, 0), (-1, -1), 2),
+                ("BOTTOMPADDING", (0, 0), (-1, -1), 4),
+            ]
+        )
+    )
+    yield table
+
+
+def _tile(one: AtAGlance) -> list[Flowable]:
+    return [
+        _text(one.value, _NUMBER),
+        _text(one.interval, _SMALL),
+        _text(one.name, _CELL),
+        _text(one.means, _SMALL),
+    ]
+
+
 def _figures(finding: Finding) -> list[tuple[str, ...]]:
     by_key = {one.key: one for one in finding.indoor.quantities}
-    return [told(by_key[key]) for key in _FIGURES if key in by_key]
+    return [(*told(by_key[key]), meaning(by_key[key])) for key in _FIGURES if key in by_key]
 
 
 def _text(words: str, style: ParagraphStyle) -> Paragraph:

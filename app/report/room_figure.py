@@ -138,6 +138,7 @@ def _plane(axis, solution: Solution, order: int):
 
 
 def _openings(axis, scene: Scene) -> None:
+    middle_x = float(paper(np.array(scene.room.centre_m))[0])
     for part in scene.boundary:
         if isinstance(part, OnPatch):
             corners = paper(np.array(corners_of(part.patch, scene.room)))
@@ -145,8 +146,18 @@ def _openings(axis, scene: Scene) -> None:
             axis.add_patch(
                 Polygon(corners, closed=True, facecolor=colour, alpha=0.55, edgecolor=colour, zorder=1.5)
             )
-            x, y = corners.mean(axis=0)
-            axis.text(x, y, word, ha="center", va="center", fontsize=9, zorder=6, color="#111111")
+            _name(axis, corners.mean(axis=0), word, middle_x)
+
+
+def _name(axis, at: np.ndarray, word: str, middle_x: float) -> None:
+    """A word beside what it names, on the side where the room ends."""
+    side = -1 if at[0] < middle_x else 1
+    axis.annotate(
+        word, at, (side * 34, 12), textcoords="offset points", fontsize=9, zorder=6, va="center",
+        ha="right" if side < 0 else "left",
+        bbox={"facecolor": "white", "edgecolor": "#99a1ab", "boxstyle": "round,pad=0.25", "lw": 0.6},
+        arrowprops={"arrowstyle": "-", "color": "#4a525c", "lw": 0.8},
+    )  # fmt: skip
 
 
 def corners_of(patch: Patch, room: Box) -> list[Vector3]:
@@ -176,19 +187,19 @@ def _box(axis, room: Box, *, far: bool) -> None:
                     line = paper(ends)
                     style = {"color": "#99a1ab", "lw": 0.8} if far else {"color": "#4a525c", "lw": 1.2}
                     axis.plot(line[:, 0], line[:, 1], zorder=1 if far else 5, **style)
-                    if (far or end_c == low[c]) and _is_labelled(a, end_b, end_c, low, high):
+                    if _is_labelled(a, end_b, end_c, low, high):
                         _length(axis, line.mean(axis=0), "xyz"[a], float(high[a] - low[a]))
 
 
 def _is_labelled(a: int, end_b: float, end_c: float, low: np.ndarray, high: np.ndarray) -> bool:
-    """One edge of each direction: the lower front one along x, the right one along y, the front left one along z."""
+    """One edge of each direction: the lower front one along x, the right one along y, the far right one along z."""
     b, c = (other for other in range(3) if other != a)
-    wanted = {0: (low[1], low[2]), 1: (high[0], low[2]), 2: (low[0], low[1])}[a]
+    wanted = {0: (low[1], low[2]), 1: (high[0], low[2]), 2: (high[0], high[1])}[a]
     return (end_b, end_c) == wanted and (b, c) != (a, a)
 
 
 def _length(axis, at: np.ndarray, name: str, length_m: float) -> None:
-    offset = {"x": (0, -11), "y": (16, -6), "z": (-22, 0)}[name]
+    offset = {"x": (0, -11), "y": (16, -6), "z": (24, 0)}[name]
     axis.annotate(
         f"{name}: {length_m:.3g} m", at, offset, textcoords="offset points", ha="center", va="center", fontsize=9,
         color="#4a525c",

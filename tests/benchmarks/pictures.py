@@ -1,11 +1,11 @@
-"""The pictures of the README: a room beside its truth, from an experiment, and the page, from a running browser.
+"""The picture of a room beside its truth that the README shows, from a solved experiment.
 
-python -m tests.benchmarks.pictures EXPERIMENT --truth ROOM.npz     # results/room.png
-python -m tests.benchmarks.pictures --page                          # results/page.png; needs Debian's chromium
+    python -m tests.benchmarks.pictures EXPERIMENT [--truth ROOM.npz]     # results/room.png
+
+The picture of the page is made by `python -m tests.browser.gallery --readme`.
 """
 
 import argparse
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +41,7 @@ def room_figure(experiment: Path, truth: RoomVolume) -> Figure:
         drawn = _slice(axis, truth, kelvin - CELSIUS_K, "inferno", float(low), float(high))
         _arrows(axis, truth, arrows)
         axis.set_title(title)
-    figure.colorbar(drawn, ax=axes[0], label="T [C]")
+    figure.colorbar(drawn, ax=axes[0], label="T [°C]")
     limit = float(2 * np.percentile(std_k, 99))
     for axis, title, values, colours in (
         (axes[1, 0], "found minus truth", warm_k - truth.temperature_k, "RdBu_r"),
@@ -70,40 +70,16 @@ def _arrows(axis: Axes, truth: RoomVolume, velocity_m_s: np.ndarray) -> None:
     )  # fmt: skip
 
 
-def page_picture(path: Path) -> None:
-    """The operator's page on a measured room."""
-    from playwright.sync_api import sync_playwright
-
-    from tests.browser.conftest import CHROMIUM, FLAGS, Station
-    from tests.browser.gallery import furnish
-
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as play:
-        station = Station(Path(folder))
-        station.start()
-        try:
-            furnish(station, planned=False)
-            browser = play.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-            page = browser.new_page(viewport={"width": 1440, "height": 900})
-            page.goto(station.address)
-            page.locator("nav").get_by_role("button", name="Look").click()
-            page.wait_for_timeout(8000)
-            page.screenshot(path=str(path))
-            browser.close()
-        finally:
-            station.stop()
-
-
 def main() -> None:
     """Draw what was asked for."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("experiment", type=Path, nargs="?")
-    parser.add_argument("--truth", type=Path)
-    parser.add_argument("--page", action="store_true")
+    parser.add_argument("experiment", type=Path)
+    parser.add_argument("--truth", type=Path, help="another one than the simulated experiment's own")
     options = parser.parse_args()
-    if options.experiment and options.truth:
-        room_figure(options.experiment, read_volume(options.truth)).savefig(RESULTS / "room.png", dpi=90)
-    if options.page:
-        page_picture(RESULTS / "page.png")
+    truth = options.truth or open_experiment(options.experiment).truth
+    if truth is None:
+        parser.error("this experiment knows no truth: name it with --truth")
+    room_figure(options.experiment, read_volume(truth)).savefig(RESULTS / "room.png", dpi=90)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,9 @@ from playwright.sync_api import Locator, Page, expect
 
 from app.client import Client
 from tests.app.api.resources.test_own_rig import room_file
+from tests.app.setup.test_lights import ABOVE, ASIDE, LEFT, jet
 from tests.browser.conftest import Opens, Station, snapshot
+from tests.browser.test_look import BOXES, are_apart
 from tests.browser.test_page import AXE
 from tests.browser.test_story import PAINTED
 
@@ -405,3 +407,23 @@ def test_an_opening_is_moved_by_keys_and_by_pointer_and_the_draft_survives_a_rel
     page.reload()
     expect(page).to_have_url(re.compile("#/new$"))
     expect(things.get_by_label("z from")).to_have_value(moved)
+
+
+@pytest.mark.parametrize("wide_px", [390, 1440])
+def test_names_in_the_drawings_of_a_rig_stay_inside_and_off_one_another(
+    station: Station, opens: Opens, wide_px: int
+):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        client.create_from_answers(jet(view=[ASIDE], light=[LEFT, ABOVE]))
+    page = opens(station.address, viewport={"width": wide_px, "height": 844}).page
+    page.get_by_role("button", name="Edit room").click()
+    rig = page.locator(".rig3d svg")
+    expect(rig.locator("text")).to_have_count(6)
+    turn = page.get_by_role("slider", name="Turn")
+    for degrees in ("35", "-90", "120"):
+        turn.fill(degrees)
+        are_apart(rig.locator("text").evaluate_all(BOXES), rig)
+    walls = page.locator("svg.walls")
+    words = walls.locator("text").evaluate_all(BOXES)
+    assert {"supply 1", "left (x_min)"} <= {one[0] for one in words}
+    are_apart(words, walls)

@@ -138,7 +138,7 @@ def test_what_was_found_before_the_wall_is_drawn_and_told(kept):
     assert page.count("data:image/png") == render_report(kept).count("data:image/png") + 1
     # It is told once; what to do about it stands with the other advice.
     assert page.count("It stands there.") == 1
-    assert "<td>Something that the scene does not state hides 10.0 % of the wall" in page
+    assert "<li>Something that the scene does not state hides 10.0 % of the wall" in page
 
 
 def test_a_result_of_an_older_program_is_reported_with_what_it_has(kept):

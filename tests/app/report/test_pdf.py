@@ -6,8 +6,9 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import create_cli
-from app.report.answer import advice, summary
+from app.report.answer import advice, summary, tiles
 from app.report.finding import read_finding
+from app.report.indoor import told
 from app.report.pdf import write_pdf
 from tests.app.report.test_indoor import experiment  # noqa: F401
 
@@ -27,9 +28,18 @@ def test_the_answer_is_three_sentences_without_jargon(finding):
     # 295 K at the floor and 2 K/m: 21.85 °C, and vertices from 0.3 to 1.7 m, 1.0 m on the mean, are in the zone.
     assert "23.9 °C" in said[0]
     assert "0.100 m/s (0.090 to 0.109)" in said[0]
+    assert "category" in said[0]
     assert "90 times an hour" in said[1]
+    assert "4.0 K warmer than at the floor" in said[1]
     assert "no truth" in said[2]
     assert not any(word in " ".join(said) for word in ("rms", "sigma", "posterior", "px"))
+
+
+def test_what_is_seen_at_a_glance_is_what_the_table_tells(finding):
+    shown = {one.name: one for one in tiles(finding)}
+    table = {one.key: told(one) for one in finding.indoor.quantities}
+    assert (shown["air changes"].value, shown["air changes"].interval) == table["air_changes"][1:]
+    assert shown["draught rate, 95th percentile"].means.startswith("category")
 
 
 def test_a_room_without_thermometers_is_told_to_hang_them(finding):

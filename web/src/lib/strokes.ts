@@ -12,7 +12,8 @@ export interface Screen {
 
 export interface Eye {
   at: Vector;
-  onScreen(at: Vector): [number, number];
+  /** Null behind the eye. */
+  onScreen(at: Vector): [number, number] | null;
 }
 
 interface Path {

@@ -17,8 +17,9 @@ import vtkVolume from "@kitware/vtk.js/Rendering/Core/Volume";
 import vtkVolumeMapper from "@kitware/vtk.js/Rendering/Core/VolumeMapper";
 import vtkGenericRenderWindow from "@kitware/vtk.js/Rendering/Misc/GenericRenderWindow";
 import type { Numbers } from "./api";
-import { stops, type Scale } from "./colour";
+import { stops, table, type Scale } from "./colour";
 import { arrows, speedLimit, streamlines, type Grid, type Lines } from "./flow";
+import { placed } from "./labels";
 import { boxesOf, type Opening, type Vector } from "./room";
 import { Strokes, type Screen } from "./strokes";
 import { ticksOf } from "./ticks";
@@ -47,6 +48,13 @@ export interface Stands {
   camera: Vector | null;
 }
 
+/** A scale as it is written on a picture that is kept: what it is of, and its ends. */
+export interface Legend {
+  kind: Scale["kind"];
+  text: string;
+  ends: [string, string];
+}
+
 export interface Scene3d {
   /** Takes what is shown; the fastest speed [m/s] is given back where velocity is known. */
   load(values: Numbers, velocity: Numbers[] | null, axes: Grid["axes"], scale: Scale, stands: Stands): number;
@@ -54,9 +62,10 @@ export interface Scene3d {
   show(modes: Modes, level: number, cuts: Record<Axis, number>): void;
   look(from: keyof typeof VIEWS): void;
   move(on: boolean): void;
-  picture(): Promise<string>;
-  /** A film of so many seconds as it is seen; null where the browser cannot make one. */
-  film(seconds: number): Promise<Blob | null>;
+  /** As it is seen, with its scales. */
+  picture(legends: Legend[]): Promise<string>;
+  /** A film of so many seconds; null where the browser cannot make one. */
+  film(seconds: number, legends: Legend[]): Promise<Blob | null>;
   /** The place on the nearest shown plane under a pixel of the view, in metres; null beside it. */
   under(x_px: number, y_px: number): Vector | null;
   /** Where one looks from: position, focus and what is up, in nine numbers. */
@@ -68,6 +77,9 @@ export interface Scene3d {
 // Voxels from sample to sample along a ray, finest first; the first that is fast enough is kept.
 const STRIDES = [1.5, 2.2, 3.2] as const;
 const SMOOTH_MS = 90;
+// Words over the dark picture, and what is behind names.
+const INK = "#dfe5ea";
+const BEHIND_NAMES = "#14171cb3";
 // Room air crosses a room in half a minute: shown so many times as fast, each stroke as long as it goes in this time.
 const FASTER = 4;
 const TAIL_S = 3;
@@ -117,7 +129,7 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     const [x = 0, y = 0] = renderer.worldToNormalizedDisplay(at[0], at[1], at[2], width / Math.max(1, height));
     return [x * width, (1 - y) * height];
   };
-  const marks = new Marks(place, onScreen);
+  const marks = new Marks(place, () => projection());
   // What moves is drawn here; the room below it stays as it is until somebody turns or changes it.
   const sheet = document.createElement("canvas");
   sheet.className = "strokes";
@@ -207,10 +219,11 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     // An actor that has nothing to draw yet cannot be rendered.
     for (const actor of [...Object.values(planes), surface, arrowActor!, lineActor!, frame, ...walls])
       if (actor.getMapper()) renderer.addActor(actor);
+    // What is named first keeps its place.
     marks.set([
-      ...axisMarks(axes),
-      ...openings.filter((one) => one.label).map((one) => ({ text: one.label, at: middleOf(one.corners) })),
+      ...openings.filter((one) => one.label).map(nameOf),
       ...(camera ? [cameraMark(camera, axes)] : []),
+      ...axisMarks(axes),
     ]);
     const isFirst = shown === null;
     shown = { values, axes };
@@ -270,7 +283,7 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     }
     // On a narrow screen the room's width is the limit.
     const isNarrow = place.clientWidth < 1.2 * place.clientHeight;
-    camera.zoom(isNarrow ? 0.85 : from === "Corner" ? 1.08 : 1.3);
+    camera.zoom(isNarrow ? 0.9 : from === "Corner" ? 1.18 : 1.3);
     renderer.resetCameraClippingRange();
     window3d.render();
     put();
@@ -306,13 +319,14 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     strokes.draw(pen, (FASTER * performance.now()) / 1000, { at: eye, onScreen: projection() }, screens());
   }
 
-  /** Where places of the room are on the screen as it is seen now, by one matrix. */
-  function projection(): (at: Vector) => [number, number] {
+  /** Where places of the room are on the screen as it is seen now, by one matrix; null for those behind the eye. */
+  function projection(): (at: Vector) => [number, number] | null {
     const { width, height } = place.getBoundingClientRect();
     const m = renderer.getActiveCamera().getCompositeProjectionMatrix(width / Math.max(1, height), -1, 1);
     const row = (n: number, [x, y, z]: Vector) => m[n]! * x + m[n + 1]! * y + m[n + 2]! * z + m[n + 3]!;
     return (at) => {
       const depth = row(12, at);
+      if (depth <= 0) return null;
       return [(0.5 + (0.5 * row(0, at)) / depth) * width, (0.5 - (0.5 * row(4, at)) / depth) * height];
     };
   }
@@ -348,12 +362,14 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     gl?.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
-  /** The room, what moves in it and the words, on one canvas. */
-  function copyTo(paper: CanvasRenderingContext2D, room: CanvasImageSource): void {
+  /** The room, what moves in it, the words and the scales, on one canvas. */
+  function copyTo(paper: CanvasRenderingContext2D, room: CanvasImageSource, legends: Legend[]): void {
     const { canvas } = paper;
     paper.drawImage(room, 0, 0, canvas.width, canvas.height);
     paper.drawImage(sheet, 0, 0, canvas.width, canvas.height);
-    marks.write(paper, canvas.width / Math.max(1, place.clientWidth));
+    const scale = canvas.width / Math.max(1, place.clientWidth);
+    marks.write(paper, scale);
+    legends.forEach((one, n) => writeLegend(paper, one, n, scale));
   }
 
   /** A copy of the room: it can be read in the turn in which it is drawn, and no later. */
@@ -367,15 +383,15 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     return copy;
   }
 
-  async function picture(): Promise<string> {
+  async function picture(legends: Legend[]): Promise<string> {
     const room = drawnRoom();
     if (!room) return "";
     const paper = room.cloneNode() as HTMLCanvasElement;
-    copyTo(paper.getContext("2d")!, room);
+    copyTo(paper.getContext("2d")!, room, legends);
     return paper.toDataURL("image/png");
   }
 
-  function film(seconds: number): Promise<Blob | null> {
+  function film(seconds: number, legends: Legend[]): Promise<Blob | null> {
     let room = drawnRoom();
     if (!room || typeof MediaRecorder === "undefined") return Promise.resolve(null);
     const paper = room.cloneNode() as HTMLCanvasElement;
@@ -385,7 +401,7 @@ export function createScene(place: HTMLElement, dragged: (axis: Axis, share: num
     const turned = renderer.getActiveCamera().onModified(() => (room = null));
     const copying = window.setInterval(() => {
       room ??= drawnRoom();
-      if (room) copyTo(paper.getContext("2d")!, room);
+      if (room) copyTo(paper.getContext("2d")!, room, legends);
     }, FRAME_MS);
     return new Promise((done) => {
       recorder.onstop = () => {
@@ -455,45 +471,87 @@ type Actor = ReturnType<typeof vtkActor.newInstance>;
 interface Mark {
   text: string;
   at: Vector;
+  /** A thing's name, an axis' name, or a tick of an axis. */
+  kind: "name" | "axis" | "tick";
+  /** What an axis' name is the name of: the name is shown where this is, though it may stand beyond the edge. */
+  of?: Vector;
 }
 
-/** Words over the picture that stay at their places in the room. */
+/** Words over the picture that stay at their places in the room, inside the picture, and not on one another. */
 class Marks {
-  private kept: { mark: Mark; element: HTMLElement }[] = [];
+  private kept: { mark: Mark; element: HTMLElement; width: number; height: number }[] = [];
+  private places: ([number, number] | null)[] = [];
 
+  /** `seen`: where a place is on the screen; null behind the eye. */
   constructor(
     private readonly place: HTMLElement,
-    private readonly seen: (at: Vector) => [number, number],
+    private readonly seen: () => (at: Vector) => [number, number] | null,
   ) {}
 
   set(marks: Mark[]): void {
     for (const one of this.kept) one.element.remove();
-    this.kept = marks.map((mark) => {
+    const elements = marks.map((mark) => {
       const element = document.createElement("span");
-      element.className = "mark";
+      element.className = `mark ${mark.kind}`;
       element.textContent = mark.text;
-      this.place.append(element);
       return { mark, element };
     });
+    this.place.append(...elements.map((one) => one.element));
+    this.kept = elements.map((one) => ({ ...one, width: one.element.offsetWidth, height: one.element.offsetHeight }));
   }
 
   /** The same words on a picture, `scale` of its pixels to one of the page. */
   write(paper: CanvasRenderingContext2D, scale: number): void {
     paper.font = `${Math.round(13 * scale)}px "DejaVu Sans", sans-serif`;
-    paper.fillStyle = "#dfe5ea";
     [paper.textAlign, paper.textBaseline] = ["center", "middle"];
-    for (const { mark } of this.kept) {
-      const [left, top] = this.seen(mark.at);
-      paper.fillText(mark.text, left * scale, top * scale);
-    }
+    this.kept.forEach(({ mark, width, height }, n) => {
+      const at = this.places[n];
+      if (!at) return;
+      const [left, top] = [at[0] * scale, at[1] * scale];
+      paper.fillStyle = BEHIND_NAMES;
+      if (mark.kind === "name")
+        paper.fillRect(left - (width * scale) / 2, top - (height * scale) / 2, width * scale, height * scale);
+      paper.fillStyle = INK;
+      paper.fillText(mark.text, left, top);
+    });
   }
 
   put(): void {
-    for (const { mark, element } of this.kept) {
-      const [left, top] = this.seen(mark.at);
-      element.style.transform = `translate(-50%, -50%) translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
-    }
+    const seen = this.seen();
+    const [wide, tall] = [this.place.clientWidth, this.place.clientHeight];
+    const labels = this.kept.map(({ mark, width, height }) => {
+      let [x, y] = seen(mark.at) ?? [NaN, NaN];
+      const [of_x, of_y] = (mark.of && seen(mark.of)) ?? [NaN, NaN];
+      if (of_x >= 0 && of_x <= wide && of_y >= 0 && of_y <= tall)
+        [x, y] = [Math.max(0, Math.min(wide, x)), Math.max(0, Math.min(tall, y))];
+      return { x, y, width, height, fixed: mark.kind === "tick" };
+    });
+    this.places = placed(labels, wide, tall);
+    this.kept.forEach(({ element }, n) => {
+      const at = this.places[n];
+      element.hidden = !at;
+      if (at) element.style.transform = `translate(-50%, -50%) translate(${at[0].toFixed(1)}px, ${at[1].toFixed(1)}px)`;
+    });
   }
+}
+
+const [BAR_PX, THICK_PX, LINE_PX, EDGE_PX] = [160, 10, 34, 12] as const;
+
+/** The n-th scale, in the upper left corner. */
+function writeLegend(paper: CanvasRenderingContext2D, { kind, text, ends }: Legend, n: number, scale: number): void {
+  const [left, top] = [EDGE_PX * scale, (EDGE_PX + n * LINE_PX) * scale];
+  const colours = table(kind);
+  for (let part = 0; part < BAR_PX; part++) {
+    const at = 3 * Math.floor((256 * part) / BAR_PX);
+    paper.fillStyle = `rgb(${colours[at]} ${colours[at + 1]} ${colours[at + 2]})`;
+    paper.fillRect(left + part * scale, top, scale + 1, THICK_PX * scale);
+  }
+  paper.fillStyle = INK;
+  paper.font = `${Math.round(12 * scale)}px "DejaVu Sans", sans-serif`;
+  [paper.textAlign, paper.textBaseline] = ["left", "top"];
+  paper.fillText(`${ends[0]} to ${ends[1]}`, left, top + (THICK_PX + 2) * scale);
+  paper.textBaseline = "middle";
+  paper.fillText(text, left + (BAR_PX + 8) * scale, top + (THICK_PX / 2) * scale);
 }
 
 /** Metres along three edges of the room, which are at its outline as seen from the corner. */
@@ -502,13 +560,15 @@ function axisMarks(axes: Grid["axes"]): Mark[] {
   const [left, right, front, back, floor] = [x[0] ?? 0, x.at(-1) ?? 1, y[0] ?? 0, y.at(-1) ?? 1, z[0] ?? 0];
   const off = 0.06 * (right - left);
   const last = (places: number[]) => ((places.at(-1) ?? 1) + (places[0] ?? 0)) / 2;
+  const ticks = (places: number[], at: (value: number) => Vector) =>
+    ticksOf(places).map((one): Mark => ({ text: one.label, at: at(one.value), kind: "tick" }));
   return [
-    ...ticksOf(x).map((one) => ({ text: one.label, at: [one.value, front - off, floor - off] as Vector })),
-    ...ticksOf(y).map((one) => ({ text: one.label, at: [right + off, one.value, floor - off] as Vector })),
-    ...ticksOf(z).map((one) => ({ text: one.label, at: [left - off, back + off, one.value] as Vector })),
-    { text: "x [m]", at: [last(x), front - 2.6 * off, floor - 2.6 * off] },
-    { text: "y [m]", at: [right + 2.6 * off, last(y), floor - 2.6 * off] },
-    { text: "z [m]", at: [left - 2.8 * off, back + 2.8 * off, last(z)] },
+    { text: "x [m]", at: [last(x), front - 2.6 * off, floor - 2.6 * off], kind: "axis", of: [last(x), front, floor] },
+    { text: "y [m]", at: [right + 2.6 * off, last(y), floor - 2.6 * off], kind: "axis", of: [right, last(y), floor] },
+    { text: "z [m]", at: [left - 2.8 * off, back + 2.8 * off, last(z)], kind: "axis", of: [left, back, last(z)] },
+    ...ticks(x, (value) => [value, front - off, floor - off]),
+    ...ticks(y, (value) => [right + off, value, floor - off]),
+    ...ticks(z, (value) => [left - off, back + off, value]),
   ];
 }
 
@@ -520,7 +580,8 @@ function cameraMark(camera: Vector, axes: Grid["axes"]): Mark {
   const away = (axes.y.at(-1) ?? 1) - camera[1];
   const [x, y, z] = standOf(camera, axes);
   const above = 0.12 * ((axes.z.at(-1) ?? 1) - (axes.z[0] ?? 0));
-  return { text: `camera, ${away.toFixed(away < 10 ? 1 : 0)} m from the wall`, at: [x, y, z + above] };
+  const text = `camera, ${away.toFixed(away < 10 ? 1 : 0)} m from the wall`;
+  return { text, at: [x, y, z + above], kind: "name" };
 }
 
 function standOf(camera: Vector, axes: Grid["axes"]): Vector {
@@ -554,6 +615,7 @@ function sightOf(camera: Vector, axes: Grid["axes"]): Actor {
   return actor;
 }
 
+const nameOf = (one: Opening): Mark => ({ text: one.label, at: middleOf(one.corners), kind: "name" });
 const middleOf = (corners: Vector[]) =>
   [0, 1, 2].map((a) => corners.reduce((sum, corner) => sum + corner[a]! / corners.length, 0)) as Vector;
 
