@@ -63,7 +63,7 @@ GUIDE = StateMachine(
 
 
 @dataclass(eq=False)
-class Run:
+class Taking:
     """Pictures that are being taken."""
 
     abort: threading.Event = field(default_factory=threading.Event)
@@ -71,7 +71,7 @@ class Run:
 
 
 # Takes pictures until it is told to stop, and returns what is wrong with them.
-Work = Callable[[Run], tuple[str, ...]]
+Work = Callable[[Taking], tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class CalibrationDesk:
         self._status = GuideStatus()
         self._skipped: dict[tuple[str, StepName, str], tuple[StageTask, ...]] = {}
         self._lock = threading.Lock()
-        self._now: Run | None = None
+        self._now: Taking | None = None
 
     @property
     def status(self) -> GuideStatus:
@@ -147,7 +147,7 @@ class CalibrationDesk:
 
     def _begin(self, begun: GuideStatus, work: Work) -> None:
         state = GUIDE.after(self._status.state, GuideEvent.take)
-        run = Run()
+        run = Taking()
         run.thread = threading.Thread(target=self._run, args=(run, work), name="calibration", daemon=True)
         self._now = run
         before, self._status = self._status, replace(begun, state=state)
@@ -216,7 +216,7 @@ class CalibrationDesk:
         skipped = self._skipped.get((experiment.folder.name, plan.step, plan.camera), ())
         return GuidedCalibration(CalibrationFolder(experiment.folder), plan, stage, skipped)
 
-    def _run(self, run: "Run", work: Work) -> None:
+    def _run(self, run: "Taking", work: Work) -> None:
         try:
             issues = work(run)
         except CalibrationStoppedError as stop:
@@ -229,7 +229,9 @@ class CalibrationDesk:
         else:
             self._end(run, GuideEvent.end, issues=issues)
 
-    def _take(self, run: "Run", experiment: Experiment, plan: LivePlan, told: Conditions) -> tuple[str, ...]:
+    def _take(
+        self, run: "Taking", experiment: Experiment, plan: LivePlan, told: Conditions
+    ) -> tuple[str, ...]:
         with self._stage(experiment, plan) as stage:
             guided = self._guided(experiment, plan, stage)
             guided.resume()
@@ -259,7 +261,7 @@ class CalibrationDesk:
         panel = panel_of(experiment.settings.scene, view)
         return (None if panel is None else self._screen_of(lamp_number(experiment, view))), panel
 
-    def _progress(self, run: "Run", done: int, total: int) -> None:
+    def _progress(self, run: "Taking", done: int, total: int) -> None:
         with self._lock:
             if self._now is not run:
                 return
@@ -269,7 +271,7 @@ class CalibrationDesk:
             self._tell_status()
 
     def _end(
-        self, run: "Run", event: GuideEvent, *, issues: tuple[str, ...] | None = None, reason: str = ""
+        self, run: "Taking", event: GuideEvent, *, issues: tuple[str, ...] | None = None, reason: str = ""
     ) -> None:
         """Leave the running state, once."""
         with self._lock:

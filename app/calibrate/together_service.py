@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from app.calibrate.folder import CalibrationFolder
-from app.calibrate.service import CalibrationDesk, GuideState, GuideStatus, Run, shown_stage
+from app.calibrate.service import CalibrationDesk, GuideState, GuideStatus, Taking, shown_stage
 from app.calibrate.together import records_of
 from app.calibrate.together_live import TogetherPlan, TogetherSession
 from app.experiment.folder import Experiment
@@ -96,7 +96,7 @@ class TogetherDesk:
     ) -> TogetherSession:
         return TogetherSession(calibration, plan, stages, self._skipped.get(calibration.experiment.name, 0))
 
-    def _work(self, experiment: Experiment, plan: TogetherPlan, run: Run) -> tuple[str, ...]:
+    def _work(self, experiment: Experiment, plan: TogetherPlan, run: Taking) -> tuple[str, ...]:
         name, issues = experiment.folder.name, ()
         with ExitStack() as stack:
             stages = {

@@ -35,7 +35,7 @@ COMMANDS = {
     ),
     "kiosk": (
         "app.commands.kiosk",
-        "Show a picture on the projector by a page in its browser, or by a card, and say when it is there.",
+        "Show pictures on projectors by pages in their browsers, or by a card, and say when they are there.",
     ),
     "calibrate": (
         "app.commands.calibrate",

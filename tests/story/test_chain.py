@@ -100,7 +100,7 @@ def test_the_report_is_one_offline_file_with_every_picture(done):
     pictures = (
         "The room: the air's temperature",
         "Temperature on the middle planes",
-        "Standard deviation of the temperature",
+        "Temperature: half of its 95 % interval",
         "Temperature minus truth",
         "mean images",
         "Measured shift",
