@@ -6,8 +6,10 @@ B puts a force on a face, and u is the velocity before:
     B^T P (u + B f) = 0     so that     (B^T P B) f = -B^T P u
 
 The matrix has a row for each face of an object. It depends on the grid and on the objects alone, and its inverse is
-made once, in float64, from the box's Green function. A step costs two solutions of the box and one product with that
-inverse (Buzbee, Dorr, George and Golub 1971). Inside the objects the velocity is then set to zero.
+made once, in float64, from the box's Green function (Buzbee, Dorr, George and Golub 1971). A step costs one solution of
+the box, one product with that inverse, and two transforms of few numbers: the pressure beside the objects is read off
+the spectrum before that is transformed back, and what the forces add is added to the spectrum. Inside the objects the
+velocity is then set to zero.
 """
 
 from functools import lru_cache
@@ -18,7 +20,7 @@ import numpy as np
 from jaxtyping import Array, Float, Float32, Int
 from scipy import sparse
 
-from core.room.pressure import PressureSolver, divergence_per_s, pressure_solver
+from core.room.pressure import PressureSolver, along_axes, divergence_per_s, pressure_solver
 from core.room.room_grid import AXES, Cells, RoomGrid, Velocity, difference
 from core.room.solids import Solids, pieces
 
@@ -26,10 +28,12 @@ from core.room.solids import Solids, pieces
 class ObstructedSolver(eqx.Module):
     """The box's solver; the cells below and above each face of an object, their distance, and minus the inverse.
 
-    `open_faces` is 1 where air may pass.
+    `near` are the box's bases at the coordinates of these cells; `below` and `above` count in the block that these
+    coordinates span. `open_faces` is 1 where air may pass.
     """
 
     box: PressureSolver
+    near: tuple[Float[Array, "nx bx"], Float[Array, "ny by"], Float[Array, "nz bz"]]
     below: Int[Array, " faces"]
     above: Int[Array, " faces"]
     spacing_m: Float[Array, " faces"]
@@ -42,10 +46,16 @@ def obstructed_solver(grid: RoomGrid, solids: Solids) -> ObstructedSolver:
     beside, behind = np.asarray(solids.beside), np.asarray(solids.behind)
     below, above = np.minimum(beside, behind), np.maximum(beside, behind)
     force = _force(grid, below.tobytes(), above.tobytes(), solids.count, np.asarray(solids.air).tobytes())
+    box = pressure_solver(grid)
+    cells = np.stack(np.unravel_index(np.concatenate([below, above]), grid.cells))
+    kept, places = zip(*(np.unique(along, return_inverse=True) for along in cells), strict=True)
+    block = np.ravel_multi_index(places, tuple(len(k) for k in kept))
+    x, y, z = (basis[:, k] for basis, k in zip(box.bases, kept, strict=True))
     return ObstructedSolver(
-        pressure_solver(grid),
-        jnp.asarray(below, jnp.int32),
-        jnp.asarray(above, jnp.int32),
+        box,
+        (x, y, z),
+        jnp.asarray(block[: len(below)], jnp.int32),
+        jnp.asarray(block[len(below) :], jnp.int32),
         2.0 * solids.centre_m,
         jnp.asarray(force),
         solids.open_faces,
@@ -58,13 +68,14 @@ def project_obstructed(
     """Velocity without divergence and without flow through objects, and the pressure [m2/s2] that made it so."""
     u, v, w = (velocity[a] * solver.open_faces[a] for a in AXES)
     velocity = u, v, w
-    source = divergence_per_s(velocity, grid) / dt_s
-    pressure = solver.box.solve(source)
-    flat = pressure.reshape(-1)
+    spectrum = solver.box.spectrum(divergence_per_s(velocity, grid) / dt_s)
+    x, y, z = solver.near
+    beside = along_axes(spectrum * solver.box.inverse, x.T, y.T, z.T)
+    flat = beside.reshape(-1)
     through = -(flat[solver.above] - flat[solver.below]) / solver.spacing_m
     force = (solver.force @ through) / solver.spacing_m
-    source = source.reshape(-1).at[solver.below].add(force).at[solver.above].add(-force).reshape(source.shape)
-    pressure = solver.box.solve(source)
+    added = jnp.zeros_like(flat).at[solver.below].add(force).at[solver.above].add(-force)
+    pressure = solver.box.pressure(spectrum + along_axes(added.reshape(beside.shape), x, y, z))
     u, v, w = (
         velocity[a] - _padded(difference(pressure, a) * (dt_s / grid.spacing_m[a]), a) * solver.open_faces[a]
         for a in AXES

@@ -34,9 +34,17 @@ class PressureSolver(eqx.Module):
 
     def solve(self, source: Cells) -> Cells:
         """p with lap p = source, zero mean; the mean of `source` is dropped."""
+        return self.pressure(self.spectrum(source))
+
+    def spectrum(self, source: Cells) -> Cells:
+        """The source in the cosine basis."""
         bx, by, bz = self.bases
-        spectrum = _along(source, bz, by, bx) * self.inverse
-        return _along(spectrum, bz.T, by.T, bx.T)
+        return along_axes(source, bx, by, bz)
+
+    def pressure(self, spectrum: Cells) -> Cells:
+        """The pressure of a source of this spectrum."""
+        bx, by, bz = self.bases
+        return along_axes(spectrum * self.inverse, bx.T, by.T, bz.T)
 
 
 def pressure_solver(grid: RoomGrid) -> PressureSolver:
@@ -73,18 +81,18 @@ def _correct(component: Float[Array, "..."], step: Float[Array, "..."], axis: in
     return with_walls(first_plane(component, axis), inner, last_plane(component, axis), axis)
 
 
-def _along(
-    field: Cells,
-    bz: Float[Array, "nz nz"],
-    by: Float[Array, "ny ny"],
-    bx: Float[Array, "nx nx"],
-) -> Cells:
+def along_axes(
+    field: Float[Array, "nx ny nz"],
+    bx: Float[Array, "mx nx"],
+    by: Float[Array, "my ny"],
+    bz: Float[Array, "mz nz"],
+) -> Float[Array, "mx my mz"]:
     """Each basis takes the last axis and puts it first: three plain matrix products, and none transposes."""
-    shape = field.shape
     for basis in (bz, by, bx):
         rows = field.reshape(-1, basis.shape[1])
-        field = lax.dot_general(basis, rows, (((1,), (1,)), ((), ())))
-    return field.reshape(shape)
+        product = lax.dot_general(basis, rows, (((1,), (1,)), ((), ())))
+        field = product.reshape(basis.shape[0], *field.shape[:-1])
+    return field
 
 
 def _axis(n: int, spacing_m: float) -> tuple[Float[np.ndarray, "n n"], Float[np.ndarray, " n"]]:
