@@ -187,11 +187,11 @@ def balances(
     inflows_m3_s: Float[np.ndarray, " inlets"],
     outflow_excess_k: float,
     problem: Problem,
-    held_k_m3_s: float = 0.0,
+    warmer_k: float = 0.0,
 ) -> list[str]:
     """The room's heat balance in words, and a warning if heat is missing.
 
-    `held_k_m3_s` is the heat source, over rho c and the whole room, that holding the measured temperatures took.
+    `warmer_k` is how much warmer thermometers say that the air is than the room of these parameters.
     """
     inflow_m3_s = float(inflows_m3_s.sum())
     if inflow_m3_s <= 0:
@@ -206,12 +206,12 @@ def balances(
         f"{brought + by_objects - carried:.0f} W through walls and heaters. {3600 * inflow_m3_s:.0f} m3/h flow "
         "through."
     ]
-    missing = capacity_w_m3_k * held_k_m3_s
+    missing = capacity_w_m3_k * inflow_m3_s * warmer_k
     if abs(missing) > _MISSING_SHARE * (abs(brought) + abs(by_objects)):
         said.append(
-            f"To hold the measured temperatures the fitted room needs {abs(missing):.0f} W "
-            f"{'more' if missing > 0 else 'less'} than supply, heaters and walls give it: a source, a leak or a "
-            "wall is not as stated."
+            f"The air is measured {abs(warmer_k):.2g} K {'warmer' if warmer_k > 0 else 'colder'} than the fitted "
+            f"room: {abs(missing):.0f} W {'more' if missing > 0 else 'less'} leave with it than supply, heaters and "
+            "walls give it. A source, a leak or a wall is not as stated."
         )
     return said
 

@@ -48,7 +48,7 @@ class RoomSettings:
     or when a round leaves more than `least_gain` of the misfit.
     `jacobian_valid`: a Jacobian is computed anew once a parameter has moved this far from where it was computed.
     `jacobian_valid_walls`, `renewals`: the same for the fine room where walls are unknown, and how often at most.
-    `fine_step`: rounds on the fine grid end when no parameter moves by more. A march of `final_s` follows.
+    `fine_step`: rounds on the fine grid end when no parameter moves by more.
     `wall_heat`: multiplies the walls' heat coefficient from the heat balance, or the nominal one.
     `log_viscosity_std`: prior deviation of the eddy viscosity's logarithm over the room; None takes the
     closure's (`core.estimate.prior`).
@@ -68,7 +68,6 @@ class RoomSettings:
     settle_s: float = 150.0
     restart_s: float = 60.0
     refine_s: float = 60.0
-    final_s: float = 90.0
     use_images: bool = True
     log_viscosity_std: float | None = None
     wall_heat: float = 1.0
@@ -142,12 +141,10 @@ def march_under(
     marches: Marches,
     *,
     doing: str | None = None,
-    held_k: Float[np.ndarray, " layers"] | None = None,
 ) -> ForwardRun:
     """March `flow` under these parameters; `seconds` are those of the reference room.
 
-    With `held_k` each layer, or the whole room, is held at that mean excess temperature (nudging). What the march is
-    for, `doing`, is told with every window; without it nothing is.
+    What the march is for, `doing`, is told with every window; without it nothing is.
     """
     model = where.model(parameters)
     flow = eqx.tree_at(lambda f: f.velocity, flow, set_normal(flow.velocity, model.boundary))
@@ -168,7 +165,7 @@ def march_under(
             under_way = counted * min(1.0, state.model_s / timing.longest_s)
             marches.tell(row, lambda: _growing(where, state, model, vertices), under_way=under_way)
 
-    done = marches.run(flow, model, timing, held_k=held_k, counted=counted, on_window=passed)
+    done = marches.run(flow, model, timing, counted=counted, on_window=passed)
     if doing is not None:
         marches.record({"doing": doing, "model_s": done.model_s, "change": done.change})
     return ForwardRun(parameters, done, room_fields(done.mean, model, where.layout, vertices))

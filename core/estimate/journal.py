@@ -30,19 +30,17 @@ class Journal:
         if content is None:
             return None
         found = decode(content)
-        blank = (like, like, 0.0, 0.0, 0, 0.0)
-        last, mean, held, model_s, steps, change = restore(found, blank, configuration=self._configuration)
-        held = held if found.header["shape"]["held"] else None
-        return March(last, mean, held, Outcome[found.header["shape"]["outcome"]], model_s, steps, change)
+        blank = (like, like, 0.0, 0, 0.0)
+        last, mean, model_s, steps, change = restore(found, blank, configuration=self._configuration)
+        return March(last, mean, Outcome[found.header["shape"]["outcome"]], model_s, steps, change)
 
     def keep_end(self, key: str, march: March) -> None:
         """Keep a march that has ended; what was kept of it on the way goes."""
         if self._store is None:
             return
-        held = march.held_k_s
         numbers = (march.model_s, march.steps, march.change)
-        state = (march.last, march.mean, 0.0 if held is None else held, *numbers)
-        shape = {"held": int(held is not None), "outcome": march.outcome.name}
+        state = (march.last, march.mean, *numbers)
+        shape = {"outcome": march.outcome.name}
         self._store[f"march-{key}"] = self._encoded(state, march.steps, shape)
         self._store.pop(f"cut-{key}", None)
 
@@ -52,14 +50,13 @@ class Journal:
         if content is None:
             return None
         found = decode(content)
-        means, held = (int(found.header["shape"][name]) for name in ("means", "held"))
-        blank = MarchState(like, (like,) * means, (0.0,) * held)
+        blank = MarchState(like, (like,) * int(found.header["shape"]["means"]))
         return restore(found, blank, configuration=self._configuration)
 
     def keep_cut(self, key: str, state: MarchState) -> None:
         """Keep a march that is under way."""
         if self._store is not None:
-            shape = {"means": len(state.means), "held": len(state.held_k_s)}
+            shape = {"means": len(state.means)}
             self._store[f"cut-{key}"] = self._encoded(state, state.windows, shape)
 
     def _encoded(self, state: object, step: int, shape: Mapping[str, int | str]) -> bytes:

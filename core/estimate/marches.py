@@ -4,9 +4,7 @@ import threading
 import time
 from collections.abc import Callable
 
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from core.checkpoint import digest
 from core.estimate.journal import Journal
@@ -61,22 +59,20 @@ class Marches:
         model: RoomModel,
         settings: MarchSettings,
         *,
-        held_k: Float[np.ndarray, " layers"] | None = None,
         counted: float = 0.0,
         on_window: Callable[[MarchState], object] = lambda state: None,
     ) -> March:
         """The march's end, from the journal or by marching; `counted` is its `work`. Raises StoppedError."""
         self._watch.check_stop()
-        key = digest(flow, model, settings, held_k)
+        key = digest(flow, model, settings)
         found = self._journal.ended(key, flow)
         if found is None:
-            held = None if held_k is None else jnp.asarray(held_k, jnp.float32)
-            found = self._marched(key, flow, model, settings, held, on_window)
+            found = self._marched(key, flow, model, settings, on_window)
         with self._lock:
             self._done += counted
         return found
 
-    def _marched(self, key: str, flow: Flow, model: RoomModel, settings: MarchSettings, held_k, on_window):
+    def _marched(self, key: str, flow: Flow, model: RoomModel, settings: MarchSettings, on_window) -> March:
         keeper = _Keeper(self._journal, key)
 
         def passed(state: MarchState) -> None:
@@ -89,7 +85,6 @@ class Marches:
                 flow,
                 model,
                 settings,
-                held_k=held_k,
                 begun=begun,
                 on_window=passed,
                 check_stop=self._watch.check_stop,

@@ -1,7 +1,7 @@
 """The fit of a room's parameters: Gauss-Newton rounds on a coarse grid, then on a fine one.
 
 The Jacobian comes from one restart of the coarse room for each parameter. Where walls are unknown the rounds on the
-fine grid are those of `core.estimate.levenberg_marquardt`. The last marches hold the measured temperatures.
+fine grid are those of `core.estimate.levenberg_marquardt`.
 """
 
 import equinox as eqx
@@ -16,7 +16,6 @@ from core.estimate.observation import Observations
 from core.estimate.parameter_names import by_name
 from core.estimate.parameter_step import Vector, corrected, farthest, misfit_ratio
 from core.estimate.prior import Prior
-from core.estimate.temperature_nudging import to_hold_k
 from core.problem import Problem
 from core.room.forward import Room
 
@@ -178,35 +177,3 @@ def fine_round(
         if left <= _REJECTED:
             break
     return new, left
-
-
-def held_fit(
-    fine: Room,
-    prior: Prior,
-    data: Observations,
-    before: ForwardRun,
-    derivatives: Derivatives,
-    settings: RoomSettings,
-    marches: Marches,
-    outlet_std_k: float,
-) -> ForwardRun:
-    """The room `before`, marched on while held at the measured mean temperatures; the longest march is the last.
-
-    A wrong level, or profile, of T gives jets the wrong buoyancy. If the held room fits worse, `before` is returned.
-    """
-    held, left, doing = before, 1.0, "hold the temperatures that measurements say"
-    for seconds in (settings.refine_s, settings.final_s):
-        held_k = to_hold_k(data, prior, derivatives, held, before, fine.layout, outlet_std_k)
-        held = march_under(
-            fine,
-            before.parameters,
-            held.flow.last,
-            seconds,
-            data.vertices,
-            marches,
-            doing=doing,
-            held_k=held_k,
-        )
-        left = misfit_ratio(data, held, before)
-        marches.record({"doing": doing, "held_s": seconds, "misfit_left": left})
-    return before if left > _ACCEPTED else held

@@ -20,11 +20,10 @@ from core.estimate.least_squares import Posterior
 from core.estimate.model_error import ModelError, model_error
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior
-from core.estimate.temperature_nudging import (
+from core.estimate.temperature_levels import (
     free_vertices,
     last_correction,
     layer_means,
-    without_nudging,
 )
 from core.estimate.uncertainty import Deviation, deviation
 from core.problem import Problem
@@ -41,8 +40,7 @@ class Analysis(eqx.Module):
     """A fitted room with everything that its solution and standard deviations are made of.
 
     `stated_room` is the room as stated. `coarse`, `first` (on the fine grid) and `other` (another closure) are under
-    the same parameters. `before` is the run under the fitted parameters; `best` is the same run held at the measured
-    level, or profile, of T.
+    the same parameters. `best` is the run under the fitted ones.
     `outlet_std_k` is how far what leaves may be from the air at the outlets' height.
     """
 
@@ -55,7 +53,6 @@ class Analysis(eqx.Module):
     coarse: RoomFields
     first: RoomFields
     other: RoomFields
-    before: ForwardRun
     best: ForwardRun
     layout: RoomLayout
     outlet_std_k: float
@@ -67,13 +64,13 @@ def solution(
     """The result: fields, standard deviations, and sentences after `notes`; T with its last correction."""
     best, box, problem = analysis.best, analysis.problem.scene.room, analysis.problem
     free = free_vertices(analysis.layout, best.fields.excess_k.shape)
-    start = without_nudging(best.fields, analysis.before.fields, analysis.data, analysis.prior, free)
+    start = best.fields
     change = last_correction(
         analysis.data, analysis.prior, analysis.derivatives, start, analysis.outlet_std_k
     )
     x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(start.excess_k.shape))
     excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
-    moved_k = float(layer_means(excess - analysis.before.fields.excess_k).mean())
+    moved_k = float(layer_means(excess - start.excess_k).mean())
     variances = change.prior_variance_k2, change.variance_k2
     before, after = ((v[:, None, :] + (_DOUBT * moved_k) ** 2) * free for v in variances)
     bent = hydrostatic_variance_m4_s4(problem, z, before), hydrostatic_variance_m4_s4(problem, z, after)
@@ -97,12 +94,16 @@ def solution(
         temperature.informed,
         outcome=best.flow.outcome,
         solver_s=seconds,
-        notes=(*notes, *sentences(analysis, error, doubt)),
+        notes=(*notes, *sentences(analysis, error, doubt, moved_k)),
     )
 
 
-def sentences(analysis: Analysis, error: ModelError, doubt: float) -> list[str]:
-    """Sentences for the operator; `doubt` is the expected error of the velocity over its size, both rms."""
+def sentences(analysis: Analysis, error: ModelError, doubt: float, moved_k: float) -> list[str]:
+    """Sentences for the operator.
+
+    `doubt` is the expected error of the velocity over its size, both rms; `moved_k` how far measurements moved the
+    level of T.
+    """
     parameters = analysis.best.parameters
     inflow = np.asarray(analysis.layout.inflow_m3_s(parameters), float)
     return [
@@ -112,7 +113,7 @@ def sentences(analysis: Analysis, error: ModelError, doubt: float) -> list[str]:
         *misfit(analysis.data, explained(analysis.data, analysis.best.fields), error),
         *doubtful(doubt),
         *other_way(likeness(analysis.data, analysis.stated_room)),
-        *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, held_k_m3_s(analysis)),
+        *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, moved_k),
     ]
 
 
@@ -127,12 +128,6 @@ def outflow_excess_k(analysis: Analysis) -> float:
     areas = np.array([outlet.area_m2 for outlet in analysis.layout.outlets])
     share = areas / max(float(areas.sum()), 1e-12)
     return float(np.dot(share, analysis.best.fields.outflow_excess_k))
-
-
-def held_k_m3_s(analysis: Analysis) -> float:
-    """The heat source, over rho c and the whole room, that held the measured temperatures."""
-    box = analysis.problem.scene.room
-    return (analysis.best.flow.held_k_s or 0.0) * float(np.prod(box.size_m))
 
 
 def hydrostatic_m2_s2(

@@ -23,6 +23,6 @@ def marched_s(prior: Prior, settings: RoomSettings) -> tuple[float, float]:
     rounds = min(settings.rounds, _UNKNOWN_ROUNDS if far else _STATED_ROUNDS)
     # One coarse correction that is tried, and the second closure's run, beside the Jacobian's.
     coarse_s = settings.settle_s + (1 + settings.renewals * far) * restarts + 2 * settings.restart_s
-    # The room as stated, each round, and two marches that are held.
-    fine_s = (2 + rounds) * settings.refine_s + settings.final_s
+    # The room as stated, and each round.
+    fine_s = (1 + rounds) * settings.refine_s
     return coarse_s, fine_s

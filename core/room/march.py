@@ -2,9 +2,8 @@
 
 The march ends when the mean velocity of a window differs from that of the window before by less than `tolerance`
 (relative rms), at `longest_s`, or after `most_steps`. The result is the mean over the last third of the time, since
-flows on coarse grids oscillate slowly. The mean temperature of the room, or of every layer, can be held: the air is
-shifted to it after each window. If a value becomes infinite, the march returns to the last window and halves the
-Courant number, once.
+flows on coarse grids oscillate slowly. If a value becomes infinite, the march returns to the last window and halves
+the Courant number, once.
 
 Between two chunks of steps a march can be stopped; it goes on from its last window (`MarchState`).
 """
@@ -16,7 +15,6 @@ from dataclasses import replace
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
@@ -63,14 +61,10 @@ class MarchSettings:
 
 
 class March(eqx.Module):
-    """The end of a march: last state, mean of the last third, how it ended, model time and steps.
-
-    `held_k_s` is the heating rate that held the temperatures, as a mean over the room and the last third.
-    """
+    """The end of a march: last state, mean of the last third, how it ended, model time and steps."""
 
     last: Flow
     mean: Flow
-    held_k_s: float | None = eqx.field(static=True)
     outcome: Outcome = eqx.field(static=True)
     model_s: float = eqx.field(static=True)
     steps: int = eqx.field(static=True)
@@ -80,12 +74,11 @@ class March(eqx.Module):
 class MarchState(eqx.Module):
     """A march between two windows: all that the next one depends on, and what is kept of those before.
 
-    `means` are of the last third of the windows so far, `held_k_s` what it took to hold temperatures over them.
+    `means` are of the last third of the windows so far.
     """
 
     flow: Flow
     means: tuple[Flow, ...] = ()
-    held_k_s: tuple[float, ...] = ()
     courant: float = 0.0
     model_s: float = 0.0
     steps: int = 0
@@ -98,12 +91,11 @@ def march(
     model: RoomModel,
     settings: MarchSettings,
     *,
-    held_k: Float[Array, " layers"] | None = None,
     begun: MarchState | None = None,
     on_window: Callable[[MarchState], object] = lambda state: None,
     check_stop: Callable[[], object] = lambda: None,
 ) -> March:
-    """March `flow` to its steady state; `held_k` holds the mean excess temperature of each layer, or of the room.
+    """March `flow` to its steady state.
 
     A march that was `begun` goes on to the same bits. `check_stop` is called between two chunks, and may raise.
     """
@@ -113,18 +105,16 @@ def march(
         if state.model_s >= settings.longest_s - 1e-6 or state.steps >= settings.most_steps:
             outcome = Outcome.step_limit
             break
-        state, outcome = _after_window(state, model, settings, held_k, check_stop)
+        state, outcome = _after_window(state, model, settings, check_stop)
         on_window(state)
     mean = _mean(list(state.means)) if state.means else state.flow
-    held = float(np.mean(state.held_k_s)) if state.held_k_s else None
-    return March(state.flow, mean, held, outcome, state.model_s, state.steps, state.change)
+    return March(state.flow, mean, outcome, state.model_s, state.steps, state.change)
 
 
 def _after_window(
     state: MarchState,
     model: RoomModel,
     settings: MarchSettings,
-    held_k: Float[Array, " layers"] | None,
     check_stop: Callable[[], object],
 ) -> tuple[MarchState, Outcome | None]:
     """The state a window later, and how the march ended if it did so."""
@@ -136,22 +126,17 @@ def _after_window(
         if state.courant < settings.courant:
             return state, Outcome.nonfinite
         return replace(state, courant=0.5 * state.courant), None
-    model_s, windows, held = state.model_s + seconds, state.windows + 1, state.held_k_s
+    model_s, windows = state.model_s + seconds, state.windows + 1
     change = float(_relative_change(mean, state.means[-1])) if state.means else float("inf")
     outcome = None
     if change < settings.tolerance and model_s > settings.least_s - 1e-6:
         outcome = Outcome.converged
-    elif held_k is not None:
-        found_k = mean.excess_k.mean((0, 1))
-        shift_k = held_k - (found_k if held_k.size > 1 else found_k.mean())
-        held = (*held, float(shift_k.mean()) / seconds)[-_third(windows) :]
-        flow = _shifted(flow, shift_k)
     elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
         flow = _levelled(flow, (flow.excess_k - start.excess_k) / seconds, model, settings.level_ahead_s)
     # Only the last third is needed, whenever the march ends.
     means = (*state.means, mean)[-_third(windows) :]
     steps = state.steps + taken
-    return MarchState(flow, means, held, state.courant, model_s, steps, windows, change), outcome
+    return MarchState(flow, means, state.courant, model_s, steps, windows, change), outcome
 
 
 def _third(windows: int) -> int:

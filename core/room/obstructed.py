@@ -6,10 +6,10 @@ B puts a force on a face, and u is the velocity before:
     B^T P (u + B f) = 0     so that     (B^T P B) f = -B^T P u
 
 The matrix has a row for each face of an object. It depends on the grid and on the objects alone, and its inverse is
-made once, in float64, from the box's Green function (Buzbee, Dorr, George and Golub 1971). A step costs one solution of
-the box, one product with that inverse, and two transforms of few numbers: the pressure beside the objects is read off
-the spectrum before that is transformed back, and what the forces add is added to the spectrum. Inside the objects the
-velocity is then set to zero.
+made once, in float64, from the box's Green function (Buzbee, Dorr, George and Golub 1971). A step costs one solution
+of the box, one product with that inverse, and two transforms of few numbers: the pressure beside the objects is read
+off the spectrum before that is transformed back, and what the forces add is added to the spectrum. Inside the objects
+the velocity is then set to zero.
 """
 
 from functools import lru_cache
@@ -49,7 +49,7 @@ def obstructed_solver(grid: RoomGrid, solids: Solids) -> ObstructedSolver:
     box = pressure_solver(grid)
     cells = np.stack(np.unravel_index(np.concatenate([below, above]), grid.cells))
     kept, places = zip(*(np.unique(along, return_inverse=True) for along in cells), strict=True)
-    block = np.ravel_multi_index(places, tuple(len(k) for k in kept))
+    block = np.asarray(np.ravel_multi_index(places, tuple(len(k) for k in kept)))
     x, y, z = (basis[:, k] for basis, k in zip(box.bases, kept, strict=True))
     return ObstructedSolver(
         box,

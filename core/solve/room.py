@@ -25,13 +25,13 @@ from core.estimate.image_noise import with_noise_seen
 from core.estimate.levenberg_marquardt import fine_search
 from core.estimate.marches import Marches
 from core.estimate.observation import Observations, observations
-from core.estimate.parameter_fit import Background, coarse_fit, fine_fit, held_fit
+from core.estimate.parameter_fit import Background, coarse_fit, fine_fit
 from core.estimate.parameter_step import Vector
 from core.estimate.plane_openings import with_plane_openings
 from core.estimate.posterior import Analysis, solution
 from core.estimate.prior import room_prior
 from core.estimate.schedule import fit_work
-from core.estimate.temperature_nudging import outlets_apart_k
+from core.estimate.temperature_levels import outlets_apart_k
 from core.estimate.unstated_heat import with_suspected_heat
 from core.problem import Problem
 from core.result import Solution
@@ -129,10 +129,9 @@ def fitted_room(
     vector, base, linearised = coarse_fit(background, data, settings, marches)
     other = run_under_other_closure(coarse, prior.parameters(vector), base, settings, vertices, marches)
     first = background.first
-    seconds = settings.refine_s + (0.0 if settings.use_images else settings.final_s)
-    if np.any(vector) or not settings.use_images:
+    if np.any(vector):
         where, flow, doing = prior.parameters(vector), first.flow.last, "march the fine room as corrected"
-        first = march_under(fine, where, flow, seconds, vertices, marches, doing=doing)
+        first = march_under(fine, where, flow, settings.refine_s, vertices, marches, doing=doing)
 
     def renewed(where: Vector) -> Derivatives:
         return perturbed(coarse, prior, where, base, settings, vertices, marches)
@@ -142,12 +141,8 @@ def fitted_room(
         found, derivatives = fine_search(fine, prior, data, first, linearised, renewed, settings, marches)
     else:
         found = fine_fit(fine, prior, data, vector, first, linearised, settings, marches)
-    before = best = found.room
-    stated = background.first.fields
-    pairs = (other, linearised.start), (stated, before.fields)
-    outlet_std_k = outlets_apart_k(data, before.fields, pairs)
-    if settings.use_images:
-        best = held_fit(fine, prior, data, before, derivatives, settings, marches, outlet_std_k)
+    best, stated = found.room, background.first.fields
+    pairs = (other, linearised.start), (stated, best.fields)
     return Analysis(
         background.problem,
         data,
@@ -158,10 +153,9 @@ def fitted_room(
         coarse=linearised.start,
         first=first.fields,
         other=other,
-        before=before,
         best=best,
         layout=fine.layout,
-        outlet_std_k=outlet_std_k,
+        outlet_std_k=outlets_apart_k(data, best.fields, pairs),
     )
 
 

@@ -16,7 +16,7 @@ from core.estimate.observation import IMAGES, observations
 from core.motion import CameraMotion
 from core.problem import Problem, ShiftMeasurement
 from core.room.vertices import RoomFields
-from tests.core.estimate.test_temperature_nudging import prior_of, problem
+from tests.core.estimate.test_temperature_levels import prior_of, problem
 
 VERTICES = (8, 8, 8)
 

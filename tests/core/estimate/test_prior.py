@@ -11,7 +11,7 @@ from core.geometry import WALLS
 from core.problem import Problem
 from core.room.vertices import RoomFields
 from core.scene import FlowModel, Wall
-from tests.core.estimate.test_temperature_nudging import VERTICES, prior_of, problem
+from tests.core.estimate.test_temperature_levels import VERTICES, prior_of, problem
 
 
 def with_walls(**kelvin: float) -> Problem:

@@ -10,7 +10,7 @@ import pytest
 from core.estimate.diagnostics import missing_heat, suspicion, undetermined
 from core.estimate.forward_runs import differences
 from core.estimate.prior import room_prior
-from core.estimate.temperature_nudging import free_vertices
+from core.estimate.temperature_levels import free_vertices
 from core.estimate.unstated_heat import (
     Suspect,
     adjoin,
@@ -23,7 +23,7 @@ from core.problem import Problem
 from core.room.boundary_conditions import boundary
 from core.room.forward import room
 from core.scene import Heater, Inlet, Outlet, Patch
-from tests.core.estimate.test_temperature_nudging import VERTICES, problem
+from tests.core.estimate.test_temperature_levels import VERTICES, problem
 
 
 def with_strips(given: Problem) -> Problem:

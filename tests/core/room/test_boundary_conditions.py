@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from core.estimate.prior import room_prior
-from core.estimate.temperature_nudging import free_vertices
+from core.estimate.temperature_levels import free_vertices
 from core.geometry import Box, looking_along_y
 from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, boundary, room_layout

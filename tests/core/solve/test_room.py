@@ -40,11 +40,9 @@ SUPPLY = Inlet(
     temperature_k=303.15,
     velocity_m_s=(0.4, 0.0, 0.0),
 )
-SETTINGS = RoomSettings(
-    cells=10, coarse_cells=8, vertices=12, settle_s=90.0, restart_s=30.0, refine_s=30.0, final_s=30.0
-)
+SETTINGS = RoomSettings(cells=10, coarse_cells=8, vertices=12, settle_s=90.0, restart_s=30.0, refine_s=30.0)
 # Where it does not matter how far the air has settled.
-SHORT = replace(SETTINGS, settle_s=20.0, restart_s=10.0, refine_s=10.0, final_s=10.0, rounds=2)
+SHORT = replace(SETTINGS, settle_s=20.0, restart_s=10.0, refine_s=10.0, rounds=2)
 
 
 def telling(told: list[dict]) -> Marches:
@@ -161,7 +159,7 @@ def test_derivatives_that_point_the_wrong_way_leave_a_room_no_worse_than_stated(
     turned = eqx.tree_at(lambda d: d.apart, background.derivatives, -background.derivatives.apart)
     reported: list[dict] = []
     vector = np.zeros(len(background.prior.active()))
-    settings = replace(SETTINGS, rounds=2, final_s=10.0)
+    settings = replace(SETTINGS, rounds=2)
     best = fine_fit(
         background.fine, background.prior, data, vector, background.first, turned, settings, telling(reported)
     )
@@ -321,7 +319,7 @@ def test_a_level_that_thermometers_moved_is_doubted_by_half_of_that(truth: Solut
     problem = measured(scene(SUPPLY), truth, 1e-5)
     fitted = fitted_room(background_of(problem, SHORT, Marches()), problem, SHORT, Marches())
     # As if parameters alone had made a room 2 K colder than the plane says.
-    colder = eqx.tree_at(lambda s: s.before.fields.excess_k, fitted, fitted.before.fields.excess_k - 2.0)
+    colder = eqx.tree_at(lambda s: s.best.fields.excess_k, fitted, fitted.best.fields.excess_k - 2.0)
     own, doubted = (solution(s, 0.0, use_images=True) for s in (fitted, colder))
 
     inside = (slice(1, -1),) * 3

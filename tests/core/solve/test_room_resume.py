@@ -14,7 +14,7 @@ from core.watch import StoppedError, Watch
 from tests.core.solve.test_room import SUPPLY, measured, scene
 
 SETTINGS = RoomSettings(
-    cells=8, coarse_cells=6, vertices=9, settle_s=20.0, restart_s=10.0, refine_s=10.0, final_s=10.0, rounds=2
+    cells=8, coarse_cells=6, vertices=9, settle_s=20.0, restart_s=10.0, refine_s=10.0, rounds=2
 )
 
 
@@ -87,8 +87,8 @@ def test_stopped_anywhere_it_goes_on_to_bitwise_the_same_end(
         (2, "march the coarse room", [cut]),
         # While two threads march, whether or not either has a window to keep.
         (questions.count // 4, "move one parameter", [some, some | cut]),
-        # At the last question: in a march that holds temperatures, all others ended.
-        (questions.count - 1, "hold the temperatures", [some | cut]),
+        # At the last question: in the last march, all others ended.
+        (questions.count - 1, "correct the fine room", [some | cut]),
     ):
         store: dict[str, bytes] = {}
         told = stopped(problem, store, Asked(n))

@@ -1,10 +1,4 @@
-"""Nudging: the last marches hold the level of T, or its profile, at what the measurements say.
-
-The fitted parameters may leave an error in the level of T and, where walls are unknown, in its profile over height.
-The correction of T (`core.estimate.discrepancy`) measures that error. Held at the corrected temperatures, the room
-gives its jets the right buoyancy. For the final correction the held room is set back to the level it had before
-(`without_nudging`); else the same error would be corrected twice.
-"""
+"""How far T, its level, and what leaves by outlets may be off; and the correction of T that follows."""
 
 from collections.abc import Iterable
 
@@ -13,7 +7,7 @@ from jaxtyping import Float
 
 from core.estimate.discrepancy import Correction, temperature_correction
 from core.estimate.explained import explained
-from core.estimate.forward_runs import Derivatives, ForwardRun
+from core.estimate.forward_runs import Derivatives
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior
 from core.geometry import WALLS, Box, Face, face_of
@@ -24,46 +18,6 @@ from core.scene import Patch
 
 # Least departure from the profile: air of one temperature has none, but its correction needs a prior.
 _LEAST_DEPARTURE_K = 1e-3
-
-
-def to_hold_k(
-    data: Observations,
-    prior: Prior,
-    derivatives: Derivatives,
-    held: ForwardRun,
-    before: ForwardRun,
-    layout: RoomLayout,
-    outlet_std_k: float,
-) -> Float[np.ndarray, " layers"]:
-    """The mean excess temperature to hold: that of `before` with the correction; departures are those of `held`.
-
-    One for each layer of cells where walls are unknown, since the model's profile depends on them; else one.
-    """
-    free = free_vertices(layout, held.fields.excess_k.shape)
-    start = without_nudging(held.fields, before.fields, data, prior, free)
-    change = last_correction(data, prior, derivatives, start, outlet_std_k).excess_k[:, None, :] * free
-    warmer_k = layer_means(start.excess_k + change) - layer_means(held.fields.excess_k)
-    faces_m = layout.grid.faces_m(2)
-    heights_m = np.linspace(faces_m[0], faces_m[-1], len(warmer_k))
-    in_cells_k = np.interp(layout.grid.centres_m(2), heights_m, warmer_k)
-    layers_k = np.asarray(held.flow.mean.excess_k, float).mean((0, 1)) + in_cells_k
-    return layers_k if prior.unknown_walls() else layers_k.mean(keepdims=True)
-
-
-def without_nudging(
-    held: RoomFields,
-    before: RoomFields,
-    data: Observations,
-    prior: Prior,
-    free: Float[np.ndarray, "vx vy vz"],
-) -> RoomFields:
-    """The held room, set back to the level (or profile) that it had before it was held."""
-    shift_k = layer_means(held.excess_k) - layer_means(before.excess_k)
-    if not prior.unknown_walls():
-        shift_k = np.full_like(shift_k, shift_k.mean())
-    outflow_k = held.outflow_excess_k.copy()
-    outflow_k[[n for n, *_ in data.outlets]] -= at_outlets(data, shift_k)
-    return RoomFields(held.excess_k - shift_k * free, held.pressure_m2_s2, held.velocity_m_s, outflow_k)
 
 
 def last_correction(
