@@ -3,7 +3,7 @@
 A lens spreads every point over more than a pixel, so a pixel follows from those around it: the weights of the best
 linear prediction (Wiener) are those of the picture itself. A defect does not follow, and its neighbours, predicted
 with it, do not either. So a pixel is a defect where it alone makes more than half of all that is unpredicted around
-it. It does not move when the camera does: a few of them tell that the camera stood still, on a bare wall and in
+it, and explains more of that than any pixel near it would. It does not move when the camera does: a few of them tell that the camera stood still, on a bare wall and in
 a texture alike.
 
 Of two defects side by side each predicts the other: they may be missed.
@@ -67,13 +67,26 @@ def _stands_alone(
 ) -> Bool[np.ndarray, "rows cols"]:
     """Where a pixel, by itself and in the prediction of its neighbours, makes more than half of what is left.
 
-    That is the pixel that is furthest from its prediction; those around it are predicted with it.
+    A defect leaves itself, and minus its weight in each prediction around it. In a blurred picture a neighbour's
+    weight is above 1, so what is left is largest beside the defect: the pixel is the one that explains most.
     """
     size = np.abs(left)
     around = ndimage.uniform_filter(size, _SQUARE, mode="constant") * _SQUARE**2
     alone = size * (1.0 + float(np.abs(weights).sum())) > _HALF * around
     rows, columns = np.nonzero(alone)
-    padded = np.pad(size, _REACH)
-    nearby = [padded[rows + r, columns + c] for r, c in _AROUND]
-    alone[rows, columns] = size[rows, columns] > np.max(nearby, axis=0, initial=0.0)
+    explained = np.pad(np.abs(_left_as_by_one(left, weights)), _REACH)
+    own = explained[rows + _REACH, columns + _REACH]
+    nearby = [explained[rows + r, columns + c] for r, c in _AROUND]
+    alone[rows, columns] = own > np.max(nearby, axis=0, initial=0.0)
     return alone
+
+
+def _left_as_by_one(
+    left: Float32[np.ndarray, "rows cols"], weights: Float[np.ndarray, " around"]
+) -> Float32[np.ndarray, "rows cols"]:
+    """How far what is left around each pixel is what a defect there leaves."""
+    rows, columns = left.shape
+    padded, total = np.pad(left, _REACH), left.copy()
+    for (r, c), weight in zip(_AROUND, weights.astype(np.float32), strict=True):
+        total -= weight * padded[2 * _REACH - r :, 2 * _REACH - c :][:rows, :columns]
+    return total

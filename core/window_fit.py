@@ -5,7 +5,9 @@
 The gain may vary over the window to second order (a, b, C): a lamp that ripples looks like a shift otherwise. C is
 as small as a ripple is expected to be, so that small windows lose little by it. The picture's gradient carries noise
 of its own, of known variance s^2 |taps|^2 / 4 a pixel, which is taken out of the normal matrix: dim pictures would
-show shifts too small (Fuller, Measurement Error Models, 1987, section 1.2). What is left beyond the noise (a chi-
+show shifts too small (Fuller, Measurement Error Models, 1987, section 1.2). A window whose own pixels are as even as noise
+shows nothing: the slopes there reach in from beyond it, and its difference, which is 0, would seem to say that it is
+still. What is left beyond the noise (a chi-
 squared above 1) counts as noise: the information is divided by it (Birge's ratio).
 """
 
@@ -21,8 +23,10 @@ _SHIFT, _NUISANCE, _DIFFERENCE = slice(0, 2), slice(2, 9), 9
 _LEAST_INFORMATION_PER_PX2 = 1e-6
 # One sigma of the light's curvature: a ripple of 1 % with a period of 60 px.
 _CURVATURE_PER_PX2 = 1e-4
-# A texture's gradient must stand so many deviations above that of noise.
+# A texture and its gradient must stand so many deviations above those of noise.
 _SEEN = 4.0
+# The mean of both pictures has this share of their difference's variance.
+_OF_MEAN = 0.25
 
 
 class WindowFit(eqx.Module):
@@ -105,14 +109,16 @@ def fit_windows(
     )
     freedom = max(pixels - products.shape[-1] + 1, 1)
     chi_squared = np.maximum(residual - noise * np.sum(shift**2, axis=1), 0.0) / freedom
-    information = information / np.maximum(chi_squared, 1.0)[:, None, None]
+    contrast = np.maximum(products[:, 2, 2] - products[:, 2, 8] ** 2 / products[:, 8, 8], 0.0) / pixels
+    shows = contrast > _OF_MEAN * (1.0 + _SEEN * np.sqrt(2 / pixels))
+    information = information * (shows / np.maximum(chi_squared, 1.0))[:, None, None]
     gain = solved[:, 0, 2] + np.einsum("wi,wi->w", solved[:, 0, :2], shift)
     return WindowFit(
-        shift,
+        shift * shows[:, None],
         information + _LEAST_INFORMATION_PER_PX2 * np.eye(2),
         chi_squared,
         gain=(2 + gain) / (2 - gain),
-        contrast=np.maximum(products[:, 2, 2] - products[:, 2, 8] ** 2 / products[:, 8, 8], 0.0) / pixels,
+        contrast=contrast,
     )
 
 
@@ -127,8 +133,7 @@ def _without_noise(
     normal: Float[np.ndarray, "windows 2 2"], score: Float[np.ndarray, "windows 2"], pixels: int
 ) -> tuple[Float[np.ndarray, "windows 2"], Float[np.ndarray, "windows 2 2"], float]:
     """Shift and information with the gradient's own noise out of the normal matrix, and that noise's share."""
-    # The mean of both pictures has a quarter of the difference's variance.
-    noise = 0.25 * pixels * float(np.sum(derivative_filter() ** 2))
+    noise = _OF_MEAN * pixels * float(np.sum(derivative_filter() ** 2))
     strength, axes = np.linalg.eigh(normal)
     texture = strength - noise
     seen = texture > _SEEN * noise * np.sqrt(2 / pixels)

@@ -2,7 +2,8 @@
 
 A thing that stands still is in both pictures and shows no shift: the pair of them cannot tell. The reference, beside
 what the scene would show, can. A block of a few windows that shows nothing of the rendered pattern is covered, with
-every window in it; so is a window beside it that lacks a good part of the pattern.
+every window in it; so is a window beside it that lacks a good part of the pattern. Where single windows show their
+pattern plainly, each is a block of its own: a thing may be narrower than several.
 """
 
 from dataclasses import dataclass
@@ -49,7 +50,10 @@ def covered_windows(
     sums = np.zeros((6, len(centres)))
     sums[:, tested] = _sums(scene, view, reference, centres[tested], window_px)
     on_wall, sums = tested.reshape(rows, columns), sums.reshape(6, rows, columns)
-    return (_covered(sums, on_wall, _windows_across(window_px)) & on_wall).ravel()
+    covered = np.zeros_like(on_wall)
+    for across in {1, _windows_across(window_px)}:
+        covered |= _without_pattern(sums, on_wall, across)
+    return ((covered | _partly(sums, on_wall, covered)) & on_wall).ravel()
 
 
 def reached_from(
@@ -66,10 +70,10 @@ def _windows_across(window_px: int) -> int:
     return 1 if window_px >= _BLOCK_PX else 2 * (-(-_BLOCK_PX // window_px) // 2) + 1
 
 
-def _covered(
+def _without_pattern(
     sums: Float[np.ndarray, "6 rows columns"], on_wall: Bool[np.ndarray, "rows columns"], across: int
 ) -> Bool[np.ndarray, "rows columns"]:
-    """Windows in a block without the pattern, and those beside them that lack a part of theirs."""
+    """Windows in a block, so many windows wide, that shows nothing of the pattern."""
     square = np.ones((across, across))
     block = _likeness(np.stack([ndimage.correlate(one, square, mode="constant") for one in sums]))
     usual, usual_gain = (float(np.median(values[on_wall])) for values in (block.z, block.gain))
@@ -79,9 +83,17 @@ def _covered(
     unlike = block.z < usual - _SIGMAS * max(scatter, (_ACROSS**2 - 3) ** -0.5)
     # Half of what one free column of windows in the block would show.
     bare = on_wall & unlike & (block.gain < usual_gain / (2 * across))
-    covered = np.asarray(ndimage.binary_dilation(bare, square), bool)
-    beside = np.asarray(ndimage.binary_dilation(covered, np.ones((3, 3))), bool)
-    return covered | (beside & (_likeness(sums).gain < (1.0 - _MISSING) * usual_gain))
+    return np.asarray(ndimage.binary_dilation(bare, square), bool)
+
+
+def _partly(
+    sums: Float[np.ndarray, "6 rows columns"],
+    on_wall: Bool[np.ndarray, "rows columns"],
+    covered: Bool[np.ndarray, "rows columns"],
+) -> Bool[np.ndarray, "rows columns"]:
+    """Windows beside covered ones that lack a part of their pattern."""
+    beside, gain = np.asarray(ndimage.binary_dilation(covered, np.ones((3, 3))), bool), _likeness(sums).gain
+    return beside & (gain < (1.0 - _MISSING) * float(np.median(gain[on_wall])))
 
 
 def _likeness(sums: Float[np.ndarray, "6 rows columns"]) -> _Likeness:

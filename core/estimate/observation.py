@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 from scipy.interpolate import RegularGridInterpolator
 
+from core.continuity import moved_as_air
 from core.data_error import PLANE_NOISE_K, WALL_MARGIN
 from core.estimate.plane_openings import still_vertices
 from core.geometry import Box, face_of
@@ -72,7 +73,7 @@ def shift_blocks(
     operator = build(scene, view, measured.centres_px, vertices, float(measured.window_px))
     block_px = _block_px(facing(scene, view)[0].room, operator, measured)
     cell = np.floor(measured.centres_px / block_px).astype(int)
-    used = away_from_walls(scene, view, measured.centres_px, WALL_MARGIN)
+    used = away_from_walls(scene, view, measured.centres_px, WALL_MARGIN) & moved_as_air(measured)
     if not used.any():
         return None
     key = cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1]

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from core.continuity import moved_as_air
 from core.data_error import WALL_MARGIN
 from core.drift import nearly_still
 from core.losses.boundary_loss import boundary_loss, level_loss, point_losses
@@ -183,6 +184,7 @@ def _kept_windows(
     """Windows that the grid can represent, the representation error in px, and what units of motion do to them."""
     shift = nearly_still(problem.shifts[view])
     used, model_std_px = _usable(shift, data)
+    used &= moved_as_air(problem.shifts[view])
     used = _away_from_walls(problem.scene, view, shift.centres_px, data.margin, used)
     kept = shift.at(used)
     return kept, model_std_px, _motion_of(problem, view).at(kept.centres_px)

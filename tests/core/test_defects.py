@@ -70,3 +70,19 @@ def test_a_picture_without_inner_pixels_is_left_alone():
     image = np.zeros((2, 9), np.float32)
 
     assert without_defects(image) is image
+
+
+def test_in_a_blurred_texture_the_defect_is_replaced_and_not_its_neighbour():
+    """Each pixel weighs more than 1 in its neighbour's prediction: what is left is largest beside the defect."""
+    random = np.random.default_rng(3)
+    drawn = ndimage.gaussian_filter(random.normal(size=(200, 200)), 2.0)
+    image = (0.5 + drawn + 1e-5 * random.normal(size=drawn.shape)).astype(np.float32)
+    # A part of the picture is a bare wall.
+    image[:, 120:] = 0.02 + 1e-5 * random.normal(size=(200, 80))
+    spoilt = image.copy()
+    spoilt[100, 160] = 1.0
+
+    repaired = without_defects(spoilt)
+
+    assert abs(repaired[100, 160] - 0.02) < 1e-3
+    assert np.abs(repaired - image)[90:111, 150:171].max() < 1e-3

@@ -214,3 +214,17 @@ def test_windows_that_something_covers_are_refused_and_the_others_are_not(coveri
 def test_a_windows_centre_is_the_mean_of_its_pixels_places():
     # Windows of 4 px: pixels 0 to 3 and 4 to 7 along a row, 0 to 3 down; what is left over belongs to none.
     np.testing.assert_array_equal(window_centres((5, 9), 4), [[1.5, 1.5], [5.5, 1.5]])
+
+
+def test_a_bare_window_beside_something_bright_does_not_say_that_it_is_still():
+    """The gradient's filter reaches into it from beyond, and between its own pixels of both pictures is nothing."""
+    random, noise = np.random.default_rng(4), 1e-4
+    reference, flow = (0.02 + noise * random.standard_normal((64, 64)) for _ in range(2))
+    # The bright thing fills a window of its own.
+    for picture in (reference, flow):
+        picture[27, 28] = 1.0
+
+    found = measure_shift(reference, flow, 2 * noise**2, 8)
+
+    beside = np.abs(found.centres_px - (28, 27)).max(axis=1) > 4.0
+    assert np.trace(found.information_per_px2, axis1=1, axis2=2)[beside].max() < 1e-3

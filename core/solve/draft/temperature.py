@@ -22,6 +22,7 @@ from collections.abc import Callable
 import numpy as np
 
 from core.air import Air
+from core.continuity import left_out, moved_as_air
 from core.drift import nearly_still
 from core.geometry import face_of
 from core.known_temperature import VertexGrid, known_temperature
@@ -109,6 +110,7 @@ def solve_temperature(
         notes=(
             "Temperature only: velocity and pressure are not solved for by this preset.",
             "What varies along the line of sight comes from the prior, not from the images.",
+            *left_out(problem.shifts),
             *([_NOT_AIR] if (n < _thinnest(air) - air.ambient_refractivity).any() else []),
         ),
     )
@@ -141,7 +143,9 @@ def _system(
     prior_k = prior_temperature(problem, grid)
     prior = excess(air, prior_k + level_k(known, prior_k) - air.ambient_temperature_k)
     representation = _paths(problem) * settings.representation
-    weights = tuple(data_weight(nearly_still(s), representation) for s in problem.shifts)
+    weights = tuple(
+        data_weight(nearly_still(s), representation) * moved_as_air(s)[:, None, None] for s in problem.shifts
+    )
     rays = operators
     layers_px = front_layers_px(problem, rays, grid, per_k)
     still = [without_shared_errors(*of) for of in zip(rays, problem.shifts, weights, layers_px, strict=True)]

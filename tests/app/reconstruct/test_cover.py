@@ -8,6 +8,7 @@ from app.rig.nuisances import covered, spoiled
 from app.simulate.worlds import LAB
 from app.volume.file import read_volume
 from app.volume.scene import RigOptions, room_scene
+from core.displacement import window_centres
 from core.rays.visibility import sees_wall
 from core.render import render_reference
 from tests.app.capture.test_series import ROOM
@@ -44,6 +45,25 @@ def test_a_tenth_of_the_wall_behind_things_is_found_in_a_labs_light(light):
     assert whole.sum() > 30
     assert found[whole].mean() > 0.95
     assert found[free].mean() < 0.02
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_thing_narrower_than_three_small_windows_is_found_as_well(seed):
+    """A block of three then always has a free part, and the paint of two and a half windows is like some pattern."""
+    window_px = 8
+    options = RigOptions(camera_px=(512, 384), stand_off_m=4.0, pattern_seed=seed)
+    scene = room_scene(read_volume(ROOM), options, "operator")
+    shown, world = noisy(render_reference(scene), 0.05, seed)
+
+    found = covered_windows(scene, 0, shown, window_px)
+
+    behind = covered(shown.shape, world, (0,), seed)
+    rows, columns = (n // window_px for n in shown.shape)
+    whole = behind.reshape(rows, window_px, columns, window_px).all((1, 3)).ravel()
+    whole &= sees_wall(scene, 0, window_centres(shown.shape, window_px), margin_px=float(window_px))
+    left_out = reached_from(found, shown.shape, window_px)
+    assert whole.sum() > 40
+    assert left_out[whole].all()
 
 
 def test_nothing_is_said_to_stand_before_a_free_wall():

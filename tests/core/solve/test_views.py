@@ -106,3 +106,25 @@ def test_cells_are_as_fine_along_an_axis_as_some_view_sees_it():
     assert one.shape[1] == 9
     assert side.shape[0] == 9
     assert side.shape[1] == 16
+
+
+def test_windows_on_something_that_moved_leave_the_answer_as_it_is(shifts):
+    """They moved by ten times the usual shift, as a plume may: but nothing near them shows half of that."""
+    problem = Problem(SCENE, shifts)
+    ceiling = shifts[2]
+    on_it = np.all(np.abs(ceiling.centres_px - (60.0, 100.0)) < 9.0, axis=1)
+    assert 4 <= on_it.sum() <= 9
+    size = np.linalg.norm(ceiling.displacement_px, axis=1)
+    usual = np.sqrt(np.mean(np.minimum(size, np.percentile(size, 90)) ** 2))
+    spoilt = replace(
+        ceiling, displacement_px=np.where(on_it[:, None], (10.0 * usual, 0.0), ceiling.displacement_px)
+    )
+
+    found = solve_draft(Problem(SCENE, (*shifts[:2], spoilt)))
+    without = solve_draft(problem)
+
+    apart = np.abs(found.temperature_k - without.temperature_k)
+    # So many windows fewer say a little less.
+    assert apart.max() < 0.1 * np.ptp(without.temperature_k)
+    assert any(f"{on_it.sum()} windows show a shift that no air has" in note for note in found.notes)
+    assert not any("no air has" in note for note in without.notes)
