@@ -3,8 +3,8 @@
 A lens spreads every point over more than a pixel, so a pixel follows from those around it: the weights of the best
 linear prediction (Wiener) are those of the picture itself. A defect does not follow, and its neighbours, predicted
 with it, do not either. So a pixel is a defect where it alone makes more than half of all that is unpredicted around
-it, and explains more of that than any pixel near it would. It does not move when the camera does: a few of them tell that the camera stood still, on a bare wall and in
-a texture alike.
+it, and explains more of that than any pixel near it would. It does not move when the camera does: a few of them tell
+that the camera stood still, on a bare wall and in a texture alike.
 
 Of two defects side by side each predicts the other: they may be missed.
 """
@@ -67,8 +67,8 @@ def _stands_alone(
 ) -> Bool[np.ndarray, "rows cols"]:
     """Where a pixel, by itself and in the prediction of its neighbours, makes more than half of what is left.
 
-    A defect leaves itself, and minus its weight in each prediction around it. In a blurred picture a neighbour's
-    weight is above 1, so what is left is largest beside the defect: the pixel is the one that explains most.
+    A defect leaves itself, and minus its weight in each prediction around it. A neighbour's weight may be
+    above 1, and what is left is then largest beside the defect: the pixel is the one that explains most.
     """
     size = np.abs(left)
     around = ndimage.uniform_filter(size, _SQUARE, mode="constant") * _SQUARE**2

@@ -5,10 +5,9 @@
 The gain may vary over the window to second order (a, b, C): a lamp that ripples looks like a shift otherwise. C is
 as small as a ripple is expected to be, so that small windows lose little by it. The picture's gradient carries noise
 of its own, of known variance s^2 |taps|^2 / 4 a pixel, which is taken out of the normal matrix: dim pictures would
-show shifts too small (Fuller, Measurement Error Models, 1987, section 1.2). A window whose own pixels are as even as noise
-shows nothing: the slopes there reach in from beyond it, and its difference, which is 0, would seem to say that it is
-still. What is left beyond the noise (a chi-
-squared above 1) counts as noise: the information is divided by it (Birge's ratio).
+show shifts too small (Fuller, Measurement Error Models, 1987, section 1.2). What is left beyond the noise (a chi-
+squared above 1) counts as noise: the information is divided by it (Birge's ratio). A window whose own pixels are as
+even as noise shows nothing: its slopes reach in from beyond it, and the difference of 0 would say that it is still.
 """
 
 import equinox as eqx
