@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from core.drift import nearly_still
 from core.problem import ShiftMeasurement
@@ -59,7 +59,7 @@ def _reached(
     far = np.flatnonzero(~found)
     if len(far) == 0:
         return found
-    _, near = cKDTree(centres_px).query(centres_px[far], min(_NEAR, len(size)))
+    _, near = KDTree(centres_px).query(centres_px[far], min(_NEAR, len(size)))
     apart = np.linalg.norm(shifts_px[far, None] - shifts_px[near], axis=2)
     noise = np.hypot(noise_px[far, None], noise_px[near])
     step = apart <= 0.5 * size[far, None] + _SIGMAS * noise
