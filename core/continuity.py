@@ -22,24 +22,27 @@ _SIGMAS = 6.0
 _TEXTURED_PX = 1.0
 
 
-def moved_as_air(shift: ShiftMeasurement) -> Bool[np.ndarray, " windows"]:
+def moved_as_air(
+    shift: ShiftMeasurement, through_air: Bool[np.ndarray, " windows"]
+) -> Bool[np.ndarray, " windows"]:
     """Windows whose shift is usual, or is reached from the usual over windows near each other.
 
-    A step to a larger shift is at most half of that shift, and noise. A window without texture is not judged. The
+    A step to a larger shift is at most half of that shift, and noise. Windows that are not seen `through_air` are not
+    judged, and tell nothing of the others: where the air ends, so does its shift. Nor is one without texture. The
     camera's unknown motion is taken out first.
     """
     still = nearly_still(shift)
     noise_px = np.sqrt(np.trace(np.linalg.inv(still.information_per_px2), axis1=1, axis2=2))
-    joined = noise_px > _TEXTURED_PX
+    joined = (noise_px > _TEXTURED_PX) | ~through_air
     seen = np.flatnonzero(~joined)
     if len(seen) > 1:
         joined[seen] = _reached(still.centres_px[seen], still.displacement_px[seen], noise_px[seen])
     return joined
 
 
-def left_out(shifts: Sequence[ShiftMeasurement]) -> tuple[str, ...]:
-    """A sentence on the windows of all views that did not move as air does; none where there are none."""
-    alone = sum(int((~moved_as_air(shift)).sum()) for shift in shifts)
+def left_out(moved: Sequence[Bool[np.ndarray, " _"]]) -> tuple[str, ...]:
+    """A sentence on the windows that did not move as air does, each view's by `moved_as_air`; none without any."""
+    alone = sum(int((~view).sum()) for view in moved)
     if alone == 0:
         return ()
     return (

@@ -73,7 +73,8 @@ def shift_blocks(
     operator = build(scene, view, measured.centres_px, vertices, float(measured.window_px))
     block_px = _block_px(facing(scene, view)[0].room, operator, measured)
     cell = np.floor(measured.centres_px / block_px).astype(int)
-    used = away_from_walls(scene, view, measured.centres_px, WALL_MARGIN) & moved_as_air(measured)
+    used = away_from_walls(scene, view, measured.centres_px, WALL_MARGIN)
+    used &= moved_as_air(measured, used)
     if not used.any():
         return None
     key = cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1]

@@ -184,7 +184,8 @@ def _kept_windows(
     """Windows that the grid can represent, the representation error in px, and what units of motion do to them."""
     shift = nearly_still(problem.shifts[view])
     used, model_std_px = _usable(shift, data)
-    used &= moved_as_air(problem.shifts[view])
+    through_air = away_from_walls(problem.scene, view, shift.centres_px, 0.0)
+    used &= moved_as_air(problem.shifts[view], through_air)
     used = _away_from_walls(problem.scene, view, shift.centres_px, data.margin, used)
     kept = shift.at(used)
     return kept, model_std_px, _motion_of(problem, view).at(kept.centres_px)

@@ -20,6 +20,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from jaxtyping import Bool
 
 from core.air import Air
 from core.continuity import left_out, moved_as_air
@@ -27,6 +28,7 @@ from core.drift import nearly_still
 from core.geometry import face_of
 from core.known_temperature import VertexGrid, known_temperature
 from core.problem import Problem, ShiftMeasurement
+from core.rays.visibility import away_from_walls
 from core.result import Outcome, Solution
 from core.scene import ProjectedPattern
 from core.setting import SettingError
@@ -110,10 +112,18 @@ def solve_temperature(
         notes=(
             "Temperature only: velocity and pressure are not solved for by this preset.",
             "What varies along the line of sight comes from the prior, not from the images.",
-            *left_out(problem.shifts),
+            *left_out(_moved_as_air(problem)),
             *([_NOT_AIR] if (n < _thinnest(air) - air.ambient_refractivity).any() else []),
         ),
     )
+
+
+def _moved_as_air(problem: Problem) -> list[Bool[np.ndarray, " _"]]:
+    """Each view's windows that moved as air does."""
+    return [
+        moved_as_air(shift, away_from_walls(problem.scene, view, shift.centres_px, 0.0))
+        for view, shift in enumerate(problem.shifts)
+    ]
 
 
 def _kelvin(air: Air, n: Volume) -> Volume:
@@ -144,7 +154,8 @@ def _system(
     prior = excess(air, prior_k + level_k(known, prior_k) - air.ambient_temperature_k)
     representation = _paths(problem) * settings.representation
     weights = tuple(
-        data_weight(nearly_still(s), representation) * moved_as_air(s)[:, None, None] for s in problem.shifts
+        data_weight(nearly_still(shift), representation) * moved[:, None, None]
+        for shift, moved in zip(problem.shifts, _moved_as_air(problem), strict=True)
     )
     rays = operators
     layers_px = front_layers_px(problem, rays, grid, per_k)
