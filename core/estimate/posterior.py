@@ -62,15 +62,14 @@ def solution(
     analysis: Analysis, seconds: float, *, use_images: bool, notes: tuple[str, ...] = ()
 ) -> Solution:
     """The result: fields, standard deviations, and sentences after `notes`; T with its last correction."""
-    best, box, problem = analysis.best, analysis.problem.scene.room, analysis.problem
-    free = free_vertices(analysis.layout, best.fields.excess_k.shape)
-    start = best.fields
+    fields, box, problem = analysis.best.fields, analysis.problem.scene.room, analysis.problem
+    free = free_vertices(analysis.layout, fields.excess_k.shape)
     change = last_correction(
-        analysis.data, analysis.prior, analysis.derivatives, start, analysis.outlet_std_k
+        analysis.data, analysis.prior, analysis.derivatives, fields, analysis.outlet_std_k
     )
-    x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(start.excess_k.shape))
-    excess = start.excess_k + (change.excess_k[:, None, :] * free if use_images else 0.0)
-    moved_k = float(layer_means(excess - start.excess_k).mean())
+    x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(fields.excess_k.shape))
+    change_k = change.excess_k[:, None, :] * free if use_images else np.zeros_like(free)
+    moved_k = float(layer_means(change_k).mean())
     variances = change.prior_variance_k2, change.variance_k2
     before, after = ((v[:, None, :] + (_DOUBT * moved_k) ** 2) * free for v in variances)
     bent = hydrostatic_variance_m4_s4(problem, z, before), hydrostatic_variance_m4_s4(problem, z, after)
@@ -80,19 +79,19 @@ def solution(
     temperature = _deviation(analysis, "excess_k", None, (before + of_points, after + of_points))
     pressure = _deviation(analysis, "pressure_m2_s2", error, bent)
     velocity = _deviation(analysis, "velocity_m_s", error)
-    doubt = rms(velocity.std) / max(rms(best.fields.velocity_m_s), float(np.finfo(np.float32).tiny))
+    doubt = rms(velocity.std) / max(rms(fields.velocity_m_s), float(np.finfo(np.float32).tiny))
     return Solution(
         x,
         y,
         z,
-        problem.scene.air.ambient_temperature_k + excess,
-        best.fields.pressure_m2_s2 + hydrostatic_m2_s2(problem, z, excess - best.fields.excess_k),
-        best.fields.velocity_m_s,
+        problem.scene.air.ambient_temperature_k + fields.excess_k + change_k,
+        fields.pressure_m2_s2 + hydrostatic_m2_s2(problem, z, change_k),
+        fields.velocity_m_s,
         temperature.std,
         pressure.std,
         velocity.std,
         temperature.informed,
-        outcome=best.flow.outcome,
+        outcome=analysis.best.flow.outcome,
         solver_s=seconds,
         notes=(*notes, *sentences(analysis, error, doubt, moved_k)),
     )

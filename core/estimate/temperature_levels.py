@@ -66,10 +66,10 @@ def _from_height_k(data: Observations, room: RoomFields) -> Float[np.ndarray, " 
     """What leaves by each measured outlet, minus the mean at its height."""
     layers_k = layer_means(room.excess_k)
     places = [n for n, *_ in data.outlets]
-    return room.outflow_excess_k[places] - at_outlets(data, layers_k)
+    return room.outflow_excess_k[places] - _at_outlets(data, layers_k)
 
 
-def at_outlets(data: Observations, layers_k: Float[np.ndarray, " vz"]) -> Float[np.ndarray, " outlets"]:
+def _at_outlets(data: Observations, layers_k: Float[np.ndarray, " vz"]) -> Float[np.ndarray, " outlets"]:
     """A profile at the heights of the measured outlets."""
     box = data.scene.room
     heights_m = np.linspace(box.lower_m[2], box.upper_m[2], len(layers_k))

@@ -79,7 +79,8 @@ def solve_temperature(
     """Temperature on `grid`; one operator a view. Raises SettingError for contradictory knowledge."""
     started = time.perf_counter()
     air = problem.scene.air
-    system, prior, shifts = _system(problem, operators, grid, settings)
+    moved = _moved_as_air(problem)
+    system, prior, shifts = _system(problem, operators, grid, settings, moved)
     inverse = preconditioner(system)
     n, history, settled = _minimise(system, inverse, shifts, prior, air, settings, watch)
     doubted = system.with_fewer_data(settings.together * _paths(problem) ** 2)
@@ -112,7 +113,7 @@ def solve_temperature(
         notes=(
             "Temperature only: velocity and pressure are not solved for by this preset.",
             "What varies along the line of sight comes from the prior, not from the images.",
-            *left_out(_moved_as_air(problem)),
+            *left_out(moved),
             *([_NOT_AIR] if (n < _thinnest(air) - air.ambient_refractivity).any() else []),
         ),
     )
@@ -138,9 +139,16 @@ def _thinnest(air: Air) -> float:
 
 
 def _system(
-    problem: Problem, operators: tuple[ShiftOperator, ...], grid: VertexGrid, settings: TemperatureSettings
+    problem: Problem,
+    operators: tuple[ShiftOperator, ...],
+    grid: VertexGrid,
+    settings: TemperatureSettings,
+    moved: list[Bool[np.ndarray, " _"]],
 ) -> tuple[System, Volume, tuple[ShiftMeasurement, ...]]:
-    """The quadratic problem, the prior as excess refractivity, and the shifts without the camera's motion."""
+    """The quadratic problem, the prior as excess refractivity, and the shifts without the camera's motion.
+
+    `moved`: each view's windows that moved as air does; the others do not count.
+    """
     air = problem.scene.air
     known = known_temperature(problem, grid)
     if not known.mask.any() and not known.means:
@@ -154,8 +162,8 @@ def _system(
     prior = excess(air, prior_k + level_k(known, prior_k) - air.ambient_temperature_k)
     representation = _paths(problem) * settings.representation
     weights = tuple(
-        data_weight(nearly_still(shift), representation) * moved[:, None, None]
-        for shift, moved in zip(problem.shifts, _moved_as_air(problem), strict=True)
+        data_weight(nearly_still(shift), representation) * as_air[:, None, None]
+        for shift, as_air in zip(problem.shifts, moved, strict=True)
     )
     rays = operators
     layers_px = front_layers_px(problem, rays, grid, per_k)
