@@ -30,19 +30,20 @@ from core.setting import check_range, setting
 # A suspected heater: one deviation, which is half of the heat that the marches found there.
 _DIFFERENCE, _WALLS_DIFFERENCE, _SUSPECTED_DIFFERENCE = 2.0, 0.3, 1.0
 
-# Most time steps of a march, for each cell along the room's edge and each second. The reference room takes half as
-# many; the limit stops a march whose air is far faster than what was stated.
-_STEPS = 1.5
+# Most time steps of a march, for each cell along the room's edge and each second. The reference room takes a quarter
+# of them; the limit stops a march whose air is far faster than what was stated.
+_STEPS = 0.6
 
 # A jet in the reference room responds to a change of its supply within this time.
-_RESPONSE_S = 30.0
+_RESPONSE_S = 60.0
 
 
 @setting
 class RoomSettings:
     """Grids, lengths of the marches, and when the fit stops. Steps are in prior standard deviations.
 
-    Times are those of the reference room; slower rooms march longer (`Room.turnover_ratio`).
+    Times are those of the reference room, as its cells live them in the mean (`core.room.march`); slower rooms march
+    longer (`Room.turnover_ratio`).
 
     `coarse_step`, `least_gain`: rounds on the coarse grid end when no parameter moves by more than `coarse_step`,
     or when a round leaves more than `least_gain` of the misfit.
@@ -65,9 +66,9 @@ class RoomSettings:
     jacobian_valid_walls: float = 1.5
     renewals: int = 2
     fine_step: float = 0.3
-    settle_s: float = 150.0
-    restart_s: float = 60.0
-    refine_s: float = 60.0
+    settle_s: float = 240.0
+    restart_s: float = 90.0
+    refine_s: float = 90.0
     use_images: bool = True
     log_viscosity_std: float | None = None
     wall_heat: float = 1.0
@@ -152,7 +153,7 @@ def march_under(
     timing = MarchSettings(
         longest_s=seconds * turnover_ratio,
         least_s=min(seconds, _RESPONSE_S) * turnover_ratio,
-        window_s=min(5.0, seconds) * turnover_ratio,
+        window_s=min(15.0, seconds) * turnover_ratio,
         settle_s=0.15 * seconds * turnover_ratio,
         level_ahead_s=20.0 * turnover_ratio,
         most_steps=round(_STEPS * float(np.prod(where.grid.cells)) ** (1 / 3) * seconds),

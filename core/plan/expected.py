@@ -21,7 +21,8 @@ from core.plan.averaging import Fluctuation, fluctuation
 from core.problem import Problem
 from core.room.forward import closure_name, room
 from core.room.march import MarchSettings
-from core.room.step import longest_step_s
+from core.room.pace import step_limits
+from core.room.step import own_pace
 from core.scene import Driving, Heater, Inlet, Scene, Wall
 from core.setting import SettingError
 from core.view_frame import Turn
@@ -38,8 +39,8 @@ _VERTICES = 33
 class ExpectedFlow:
     """Excess temperature on a vertex grid, and in words where it comes from; the rest if it was marched.
 
-    `step_s` is the longest stable time step on cells of `cell_m`, for the cost of finer marches; `fluctuation` is how
-    the air would move about this mean, where a closure tells.
+    `step_s` is the mean over cells of `cell_m` of their stable time steps, for the cost of finer marches;
+    `fluctuation` is how the air would move about this mean, where a closure tells.
     """
 
     grid: VertexGrid
@@ -120,7 +121,8 @@ def _marched(problem: Problem) -> ExpectedFlow:
     stated = [0.0, *_stated_excesses_k(problem)]
     excess = np.clip(excess, min(stated), max(stated))
     model = coarse.model(prior.mean)
-    step_s = float(longest_step_s(done.flow.last, model, MarchSettings().courant))
+    limits = step_limits(MarchSettings().courant, np.inf, steady=True)
+    step_s = float(own_pace(done.flow.last, model, limits).own_s.mean())
     solids = model.boundary.solids
     return ExpectedFlow(
         VertexGrid(scene.room, shape),

@@ -47,9 +47,9 @@ class AbstractClosure(eqx.Module):
         velocity: Velocity,
         boundary: Boundary,
         grid: RoomGrid,
-        dt_s: Float[Array, ""],
+        own_s: Cells,
     ) -> KEpsilonState | None:
-        """The state after `dt_s`."""
+        """The state after `own_s`."""
 
     @abc.abstractmethod
     def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
@@ -81,7 +81,7 @@ class AbstractAlgebraicClosure(AbstractClosure):
         velocity: Velocity,
         boundary: Boundary,
         grid: RoomGrid,
-        dt_s: Float[Array, ""],
+        own_s: Cells,
     ) -> KEpsilonState | None:
         """No state."""
         return None
@@ -142,12 +142,12 @@ class KEpsilonClosure(AbstractClosure):
         velocity: Velocity,
         boundary: Boundary,
         grid: RoomGrid,
-        dt_s: Float[Array, ""],
+        own_s: Cells,
     ) -> KEpsilonState | None:
         """One step of both equations."""
         if state is None:
             return None
-        return advance(state, velocity, boundary, grid, dt_s, self.molecular_m2_s, self.scale)
+        return advance(state, velocity, boundary, grid, own_s, self.molecular_m2_s, self.scale)
 
     def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
         """C_mu k^2 / epsilon, and the log law on walls."""

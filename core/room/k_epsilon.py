@@ -10,7 +10,7 @@ cell touches. Sources are taken implicitly, so both stay positive at any step. F
 
 Where hardly anything feeds turbulence k^2 / eps would grow without end, since eps decays faster than k. So no eddy is
 larger than the log law allows in the middle between two walls: C^(3/4) k^(3/2) / eps <= kappa h / 2, with h the
-room's smallest size.
+room's smallest size between walls.
 """
 
 import equinox as eqx
@@ -57,11 +57,11 @@ def advance(
     velocity: Velocity,
     boundary: Boundary,
     grid: RoomGrid,
-    dt_s: Float[Array, ""],
+    own_s: Cells,
     molecular_m2_s: Float[Array, ""],
     scale: Float[Array, ""],
 ) -> KEpsilonState:
-    """k and epsilon after `dt_s`."""
+    """k and epsilon after each cell's step."""
     k, epsilon = state.energy_m2_s2, state.dissipation_m2_s3
     eddy = scale * state.eddy_m2_s()
     # The division last: XLA keeps its result for both equations, and would work a product out twice.
@@ -77,18 +77,25 @@ def advance(
         epsilon, inflow_e, velocity, molecular_m2_s + eddy / SIGMA_EPSILON, boundary, grid, limited=False
     )
     frequency = epsilon / k
-    new_k = (k + dt_s * (k_rate + production)) / (1.0 + dt_s * frequency)
-    new_e = (epsilon + dt_s * (e_rate + C_1 * production * frequency)) / (1.0 + dt_s * C_2 * frequency)
-    new_e = jnp.maximum(new_e, C_MU**0.75 * new_k**1.5 / largest_eddy_m(grid))
+    new_k = (k + own_s * (k_rate + production)) / (1.0 + own_s * frequency)
+    new_e = (epsilon + own_s * (e_rate + C_1 * production * frequency)) / (1.0 + own_s * C_2 * frequency)
+    new_e = jnp.maximum(new_e, C_MU**0.75 * new_k**1.5 / largest_eddy_m(boundary, grid))
     new_e = jnp.where(touched > 0, wall_epsilon, new_e)
     if boundary.solids is not None:
         new_k, new_e = new_k * boundary.solids.air, new_e * boundary.solids.air
     return KEpsilonState(jnp.maximum(new_k, SMALLEST_K), jnp.maximum(new_e, SMALLEST_EPSILON))
 
 
-def largest_eddy_m(grid: RoomGrid) -> float:
-    """The log law's mixing length in the middle between the two walls that are nearest to one another."""
-    return KAPPA * 0.5 * min(n * h for n, h in zip(grid.cells, grid.spacing_m, strict=True))
+def largest_eddy_m(boundary: Boundary, grid: RoomGrid) -> Float[Array, ""]:
+    """The log law's mixing length in the middle between the two walls that are nearest to one another.
+
+    Free surfaces are no walls: air between two of them may be as thin as one likes.
+    """
+    between = [
+        grid.cells[a] * grid.spacing_m[a] / jnp.maximum(jnp.maximum(low.no_slip, high.no_slip), 1e-6)
+        for a, (low, high) in enumerate(boundary.walls)
+    ]
+    return KAPPA * 0.5 * jnp.min(jnp.stack(between))
 
 
 def strain_squared(velocity: Velocity, grid: RoomGrid) -> Cells:

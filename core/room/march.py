@@ -1,14 +1,15 @@
 """March a room to its steady state, in windows of model time.
 
 The march ends when the mean velocity of a window differs from that of the window before by less than `tolerance`
-(relative rms), at `longest_s`, or after `most_steps`. The result is the mean over the last third of the time, since
-flows on coarse grids oscillate slowly. If a value becomes infinite, the march returns to the last window and halves
+(relative rms), at `longest_s`, or after `most_steps`. The result is the mean over the last fifth of the time, since
+flows on coarse grids may oscillate. If a value becomes infinite, the march returns to the last window and halves
 the Courant number, once.
+
+Time is what the room's cells have lived through in the mean: each takes its own steps (`core.room.pace`).
 
 Between two chunks of steps a march can be stopped; it goes on from its last window (`MarchState`).
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -20,12 +21,15 @@ from jaxtyping import Array, Bool, Float, Int
 
 from core.result import Outcome
 from core.room.level import level_correction
+from core.room.pace import StepLimits, step_limits
 from core.room.room_grid import Cells
-from core.room.step import Flow, RoomModel, longest_step_s, two_steps
+from core.room.step import Flow, RoomModel, own_pace, two_steps
 from core.setting import SettingError, setting
 
-# Of the stable step, in the first chunk of a room with objects.
+# Of the stable Courant number, in the first chunk of a room with objects.
 _FIRST_SHARE = 0.3
+# Of a window: what is left and is less counts as marched.
+_NOTHING = 1e-5
 
 
 @setting
@@ -34,18 +38,20 @@ class MarchSettings:
 
     `least_s`: no march is called steady before it; just after a change of the supply windows hardly differ.
     `level_ahead_s`: how far the layers' heat balance is extrapolated after each window (`core.room.level`; 0: not at
-    all), from `settle_s` to two thirds of `longest_s`. No window begins after `most_steps`.
+    all), from `settle_s` to two thirds of `longest_s`. No window begins after `most_steps`. A march that is not
+    `steady` is true in time: all cells take the same steps, and no wave is damped.
     """
 
     longest_s: float = 60.0
     least_s: float = 0.0
-    window_s: float = 5.0
-    tolerance: float = 0.02
+    window_s: float = 15.0
+    tolerance: float = 0.002
     courant: float = 0.45
     level_ahead_s: float = 20.0
     settle_s: float = 15.0
     chunk_steps: int = 20
     most_steps: int = 1_000_000
+    steady: bool = True
 
     def __post_init__(self) -> None:
         if not 0.0 < self.courant <= 0.5:
@@ -61,7 +67,7 @@ class MarchSettings:
 
 
 class March(eqx.Module):
-    """The end of a march: last state, mean of the last third, how it ended, model time and steps."""
+    """The end of a march: last state, mean of the last fifth, how it ended, model time and steps."""
 
     last: Flow
     mean: Flow
@@ -74,7 +80,7 @@ class March(eqx.Module):
 class MarchState(eqx.Module):
     """A march between two windows: all that the next one depends on, and what is kept of those before.
 
-    `means` are of the last third of the windows so far.
+    `means` are of the last fifth of the windows so far.
     """
 
     flow: Flow
@@ -119,9 +125,7 @@ def _after_window(
 ) -> tuple[MarchState, Outcome | None]:
     """The state a window later, and how the march ended if it did so."""
     start, seconds = state.flow, settings.window_s
-    # Objects' heat starts plumes that the first state does not show.
-    careful = _FIRST_SHARE if model.boundary.solids is not None and state.windows == 0 else 1.0
-    mean, flow, taken = _window(start, model, settings, (state.courant, careful), check_stop)
+    mean, flow, lived_s, taken = window(start, model, settings, state, check_stop)
     if not bool(_finite(flow)):
         if state.courant < settings.courant:
             return state, Outcome.nonfinite
@@ -132,68 +136,65 @@ def _after_window(
     if change < settings.tolerance and model_s > settings.least_s - 1e-6:
         outcome = Outcome.converged
     elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
-        flow = _levelled(flow, (flow.excess_k - start.excess_k) / seconds, model, settings.level_ahead_s)
-    # Only the last third is needed, whenever the march ends.
-    means = (*state.means, mean)[-_third(windows) :]
+        flow = _levelled(flow, (flow.excess_k - start.excess_k) / lived_s, model, settings.level_ahead_s)
+    # Only the last fifth is needed, whenever the march ends.
+    means = (*state.means, mean)[-_fifth(windows) :]
     steps = state.steps + taken
     return MarchState(flow, means, state.courant, model_s, steps, windows, change), outcome
 
 
-def _third(windows: int) -> int:
-    return max(1, round(windows / 3))
+def _fifth(windows: int) -> int:
+    return max(1, round(windows / 5))
 
 
-def _window(
+def window(
     flow: Flow,
     model: RoomModel,
     settings: MarchSettings,
-    courants: tuple[float, float],
+    state: MarchState,
     check_stop: Callable[[], object],
-) -> tuple[Flow, Flow, int]:
-    """Mean over one window, the state at its end, and the steps taken; `courants`: number, and its first share."""
-    courant, share = courants
+) -> tuple[Flow, Flow, Cells, int]:
+    """Mean over one window, the state at its end, the time that each cell has lived [s], and the steps taken."""
     left_s, means, weights, taken = settings.window_s, [], [], 0
-    while left_s > 1e-9:
+    lived_s = jnp.zeros(model.grid.cells)
+    most = settings.chunk_steps
+    pairs, first = most, state.windows == 0
+    while left_s > _NOTHING * settings.window_s:
         check_stop()
-        stable_s = float(_longest_step_s(flow, model, courant))
-        if not stable_s > 1e-9:
+        # Air at rest allows any step, but it does not stay at rest; objects' heat starts plumes.
+        careful = _FIRST_SHARE if first and model.boundary.solids is not None else 1.0
+        longest_s = min(settings.window_s / (2 * most), left_s / (2 * pairs))
+        limits = step_limits(careful * state.courant, longest_s, steady=settings.steady, first=first)
+        flow, mean, own_s = advance_chunk(flow, model, jnp.int32(pairs), limits)
+        passed_s = float(own_s.mean())
+        if not passed_s > 1e-9:
             break
-        # Air at rest allows any step; the first ones are short, since it does not stay at rest.
-        longest_s = min(share * stable_s, settings.window_s / (2 * settings.chunk_steps))
-        pairs, dt_s = chunk_pairs(left_s, longest_s, settings.chunk_steps)
-        share = 1.0
-        flow, mean = advance_chunk(flow, model, jnp.float32(dt_s), jnp.int32(pairs))
         means.append(mean)
-        weights.append(pairs * dt_s)
-        taken += 2 * pairs
-        left_s -= 2 * pairs * dt_s
+        weights.append(float(pairs))
+        lived_s, taken, left_s, first = lived_s + own_s, taken + 2 * pairs, left_s - passed_s, False
+        # The next chunk, if the room goes on at this pace: what is left, in as many pairs as it takes.
+        pairs = max(1, min(most, round(0.5 + left_s * pairs / passed_s)))
     if not means:
-        return flow, eqx.tree_at(lambda f: f.excess_k, flow, flow.excess_k * jnp.nan), 0
-    return _mean(means, weights), flow, taken
-
-
-def chunk_pairs(left_s: float, stable_s: float, most: int) -> tuple[int, float]:
-    """Pairs of steps of the next chunk, at most `most`, and the step [s]: what is left, in equal stable steps."""
-    pairs = max(1, math.ceil(left_s / (2 * stable_s) - 1e-6))
-    chunks = math.ceil(pairs / most)
-    in_chunk = math.ceil(pairs / chunks)
-    return in_chunk, left_s / (2 * chunks * in_chunk)
+        return flow, eqx.tree_at(lambda f: f.excess_k, flow, flow.excess_k * jnp.nan), lived_s, 0
+    return _mean(means, weights), flow, lived_s, taken
 
 
 @eqx.filter_jit
 def advance_chunk(
-    flow: Flow, model: RoomModel, dt_s: Float[Array, ""], pairs: Int[Array, ""]
-) -> tuple[Flow, Flow]:
-    """The flow after `pairs` pairs of steps, and its mean over them; one program for any number of them."""
+    flow: Flow, model: RoomModel, pairs: Int[Array, ""], limits: StepLimits
+) -> tuple[Flow, Flow, Cells]:
+    """The flow after `pairs` pairs of steps, its mean over them, and the time that each cell has lived [s]."""
 
-    def body(_: Int[Array, ""], carry: tuple[Flow, Flow]) -> tuple[Flow, Flow]:
-        flow, total = carry
-        flow = two_steps(flow, model, dt_s)
-        return flow, jax.tree.map(jnp.add, total, flow)
+    def body(_: Int[Array, ""], carry: tuple[Flow, Flow, Cells]) -> tuple[Flow, Flow, Cells]:
+        flow, total, lived_s = carry
+        pace = own_pace(flow, model, limits)
+        flow = two_steps(flow, model, pace)
+        return flow, jax.tree.map(jnp.add, total, flow), lived_s + 2.0 * pace.own_s
 
-    flow, total = lax.fori_loop(0, pairs, body, (flow, jax.tree.map(jnp.zeros_like, flow)))
+    start = flow, jax.tree.map(jnp.zeros_like, flow), jnp.zeros(model.grid.cells)
+    flow, total, lived_s = lax.fori_loop(0, pairs, body, start)
     count = pairs.astype(jnp.float32)
-    return _filled(flow, model), _filled(jax.tree.map(lambda leaf: leaf / count, total), model)
+    return _filled(flow, model), _filled(jax.tree.map(lambda leaf: leaf / count, total), model), lived_s
 
 
 def _filled(flow: Flow, model: RoomModel) -> Flow:
@@ -203,9 +204,6 @@ def _filled(flow: Flow, model: RoomModel) -> Flow:
         return flow
     scalars = flow.excess_k, flow.pressure_m2_s2, flow.turbulence
     return Flow(flow.velocity, *jax.tree.map(solids.filled, scalars))
-
-
-_longest_step_s = eqx.filter_jit(longest_step_s)
 
 
 @eqx.filter_jit

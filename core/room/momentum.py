@@ -39,11 +39,11 @@ class Viscosity(eqx.Module):
 def momentum_rate(
     velocity: Velocity,
     viscosity: Viscosity,
-    buoyancy_m_s2: Cells,
+    buoyancy_m_s2: Float[Array, "nx ny inner"],
     boundary: Boundary,
     grid: RoomGrid,
 ) -> tuple[Field, Field, Field]:
-    """du/dt of the inner faces of each component, pressure left out."""
+    """du/dt of the inner faces of each component, pressure left out; buoyancy is that at the faces between layers."""
     inside = closed(viscosity.cells_m2_s)
     rates = []
     for a in AXES:
@@ -59,7 +59,7 @@ def momentum_rate(
             drag = _drag_per_s(viscosity.on_objects_m2_s, boundary.solids, a)
             rate = rate - drag * cut(velocity[a], 1, -1, a)
         rates.append(_with_inlets(rate, boundary.walls[a], a))
-    rates[2] = rates[2] + face_mean(buoyancy_m_s2, 2)
+    rates[2] = rates[2] + buoyancy_m_s2
     u, v, w = rates
     return u, v, w
 

@@ -5,7 +5,10 @@
 
 Temperature first, so that its buoyancy drives the velocity of the same step. Cost: about 300 floating
 point operations a cell and step and 12 n^4 of matrix products for the pressure; memory: about 60 fields.
-Stable below `longest_step_s`; first order in time, second order in space where the fields are smooth.
+Stable at the steps of `own_pace`; first order in time, second order in space where the fields are smooth.
+
+The pressure is that of the last step plus what is still missing. So steady air is the same however long each cell's
+step is (`core.room.pace`).
 """
 
 import equinox as eqx
@@ -18,6 +21,7 @@ from core.room.closure import AbstractClosure
 from core.room.k_epsilon import TURBULENT_PRANDTL, KEpsilonState
 from core.room.momentum import Viscosity, momentum_rate
 from core.room.obstructed import ObstructedSolver, obstructed_solver, project_obstructed
+from core.room.pace import Pace, StepLimits, pace_of, wave_damping_k
 from core.room.pressure import PressureSolver, pressure_solver, project
 from core.room.room_grid import (
     AXES,
@@ -25,6 +29,8 @@ from core.room.room_grid import (
     RoomGrid,
     Velocity,
     cut,
+    difference,
+    face_mean,
     first_plane,
     last_plane,
     with_walls,
@@ -102,8 +108,8 @@ def air_at_rest(model: RoomModel, excess_k: Cells, speed_m_s: float) -> Flow:
     return Flow(velocity, excess_k, jnp.zeros_like(excess_k), turbulence)
 
 
-def step(flow: Flow, viscosity: Viscosity, model: RoomModel, dt_s: Float[Array, ""]) -> Flow:
-    """The flow after `dt_s`, turbulence unchanged."""
+def step(flow: Flow, viscosity: Viscosity, model: RoomModel, pace: Pace) -> Flow:
+    """The flow after each cell's step, turbulence unchanged."""
     grid, boundary = model.grid, model.boundary
     factors = model.closure.wall_heat(flow.turbulence, grid)
     solids = boundary.solids
@@ -112,25 +118,33 @@ def step(flow: Flow, viscosity: Viscosity, model: RoomModel, dt_s: Float[Array, 
     heating = scalar_rate(
         flow.excess_k, inflow, flow.velocity, model.diffusivity_m2_s(viscosity), boundary, grid
     ) + wall_heat_rate(flow.excess_k, boundary, factors, grid, of_objects)
-    excess_k = flow.excess_k + dt_s * heating
-    rates = momentum_rate(flow.velocity, viscosity, model.buoyancy_m_s2_k * excess_k, boundary, grid)
-    u, v, w = (_advance_inner(flow.velocity[a], dt_s * rates[a], a) for a in AXES)
+    excess_k = flow.excess_k + pace.own_s * heating
+    soon_k = face_mean(excess_k, 2) + wave_damping_k(excess_k, heating, model.buoyancy_m_s2_k, pace, grid)
+    rates = momentum_rate(flow.velocity, viscosity, model.buoyancy_m_s2_k * soon_k, boundary, grid)
+    u, v, w = (
+        _advance_inner(
+            flow.velocity[a], pace.faces_s(a) * (rates[a] - _slope(flow.pressure_m2_s2, a, grid)), a
+        )
+        for a in AXES
+    )
     solver = model.pressure
     if isinstance(solver, PressureSolver):
-        velocity, pressure = project((u, v, w), dt_s, grid, solver)
+        velocity, missing = project((u, v, w), pace.shortest_s, grid, solver)
     else:
-        velocity, pressure = project_obstructed((u, v, w), dt_s, grid, solver)
-    return Flow(velocity, excess_k, pressure, flow.turbulence)
+        velocity, missing = project_obstructed((u, v, w), pace.shortest_s, grid, solver)
+    return Flow(velocity, excess_k, flow.pressure_m2_s2 + missing / pace.longer, flow.turbulence)
 
 
-def two_steps(flow: Flow, model: RoomModel, dt_s: Float[Array, ""]) -> Flow:
+def two_steps(flow: Flow, model: RoomModel, pace: Pace) -> Flow:
     """Two steps under one update of the turbulence, which is slower than the flow."""
-    turbulence = model.closure.advance(flow.turbulence, flow.velocity, model.boundary, model.grid, 2.0 * dt_s)
+    turbulence = model.closure.advance(
+        flow.turbulence, flow.velocity, model.boundary, model.grid, 2.0 * pace.own_s
+    )
     viscosity = model.viscosity(Flow(flow.velocity, flow.excess_k, flow.pressure_m2_s2, turbulence))
 
     def once(_: Int[Array, ""], air: tuple[Velocity, Cells, Cells]) -> tuple[Velocity, Cells, Cells]:
         velocity, excess_k, pressure_m2_s2 = air
-        after = step(Flow(velocity, excess_k, pressure_m2_s2, turbulence), viscosity, model, dt_s)
+        after = step(Flow(velocity, excess_k, pressure_m2_s2, turbulence), viscosity, model, pace)
         return after.velocity, after.excess_k, after.pressure_m2_s2
 
     # A loop compiles the step once; turbulence stays out of what it carries, and is not copied.
@@ -139,10 +153,11 @@ def two_steps(flow: Flow, model: RoomModel, dt_s: Float[Array, ""]) -> Flow:
     return Flow(velocity, excess_k, pressure_m2_s2, turbulence)
 
 
-def longest_step_s(flow: Flow, model: RoomModel, courant: float) -> Float[Array, ""]:
-    """The longest stable step: Courant number `courant` summed over axes, and a cell's own weight not below 0.
+def own_pace(flow: Flow, model: RoomModel, limits: StepLimits) -> Pace:
+    """Stable steps: the Courant number summed over the axes, a cell's own weight not below 0, and slow acceleration.
 
-    What diffuses out of a cell in a step is at most what it holds: 2 D dt (1/hx^2 + 1/hy^2 + 1/hz^2) <= 1.
+    What diffuses out of a cell in a step is at most what it holds: 2 D dt (1/hx^2 + 1/hy^2 + 1/hz^2) <= 1. Buoyancy
+    moves air that was at rest by less than a cell: g beta (T_max - T_min) dt^2 / 2 <= h.
     """
     grid = model.grid
     rate = sum(
@@ -153,7 +168,9 @@ def longest_step_s(flow: Flow, model: RoomModel, courant: float) -> Float[Array,
     viscosity = model.viscosity(flow)
     diffusive = jnp.maximum(viscosity.cells_m2_s, model.diffusivity_m2_s(viscosity))
     curvature = sum(1.0 / h**2 for h in grid.spacing_m)
-    return 1.0 / jnp.max(rate / courant + 2.0 * curvature * diffusive + 1e-6)
+    contrast_k = jnp.max(flow.excess_k) - jnp.min(flow.excess_k)
+    falling = jnp.sqrt(0.5 * jnp.abs(model.buoyancy_m_s2_k) * contrast_k / grid.spacing_m[2])
+    return pace_of(rate / limits.courant + 2.0 * curvature * diffusive + falling + 1e-6, limits)
 
 
 def _sliding_rate(model: RoomModel) -> Cells:
@@ -168,6 +185,10 @@ def _sliding_rate(model: RoomModel) -> Cells:
         )
         rate = add_to_walls(rate, below, above, a)
     return rate
+
+
+def _slope(field: Cells, axis: int, grid: RoomGrid) -> Float[Array, "..."]:
+    return difference(field, axis) / grid.spacing_m[axis]
 
 
 def _advance_inner(

@@ -119,7 +119,7 @@ class Unsteady:
     def after(self, flow: Flow, seconds: float) -> Flow:
         """The flow after so long, with nothing held or extrapolated."""
         settings = MarchSettings(
-            longest_s=seconds, window_s=seconds, tolerance=0.0, level_ahead_s=0.0, chunk_steps=20
+            longest_s=seconds, window_s=seconds, tolerance=0.0, level_ahead_s=0.0, steady=False
         )
         return march(flow, self.model, settings).last
 

@@ -23,6 +23,7 @@ from core.objects import RoomObject
 from core.room.boundary_conditions import RoomParameters, room_layout
 from core.room.forward import Room, room
 from core.room.march import MarchSettings, advance_chunk, march
+from core.room.pace import step_limits
 from core.room.room_grid import RoomGrid
 from core.room.step import Flow
 from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, View, Wall
@@ -157,15 +158,16 @@ def cost(cells: int, pairs: int = 5, rounds: int = 12) -> dict[str, float | str]
         RoomObject(name="desk", lower_m=(2.2, 1.5, 0.0), upper_m=(2.8, 2.8, 0.75)),
     )
     flows, models, least_s = [], [], [np.inf, np.inf]
+    limits = step_limits(0.45, 0.02, steady=True)
     for things in ((), standing):
         where = room(_scene(size_m, openings, *things), cells, "k_epsilon")
         models.append(where.model(_parameters(where, 75.0)))
         flow = where.at_rest(models[-1], np.zeros(where.grid.cells[2]))
-        flows.append(advance_chunk(flow, models[-1], jnp.float32(0.02), jnp.int32(pairs))[0])
+        flows.append(advance_chunk(flow, models[-1], jnp.int32(pairs), limits)[0])
     for _ in range(rounds):
         for which, (flow, model) in enumerate(zip(flows, models, strict=True)):
             began = time.process_time()
-            jax.block_until_ready(advance_chunk(flow, model, jnp.float32(0.02), jnp.int32(pairs)))
+            jax.block_until_ready(advance_chunk(flow, model, jnp.int32(pairs), limits))
             least_s[which] = min(least_s[which], (time.process_time() - began) / pairs)
     return {
         "part": "cost", "cells": cells, "empty_s": least_s[0], "objects_s": least_s[1],

@@ -5,11 +5,14 @@ import pytest
 
 from core.result import Outcome
 from core.room.closure import ConstantClosure
-from core.room.march import MarchSettings, chunk_pairs, march
+from core.room.march import MarchSettings, MarchState, march, window
+from core.room.pace import step_limits
 from core.room.room_grid import RoomGrid
-from core.room.step import RoomModel, air_at_rest, longest_step_s, room_model
+from core.room.step import RoomModel, air_at_rest, own_pace, room_model
 from core.room.wall_planes import Boundary, WallPlane, closed_room
 from core.setting import SettingError
+
+LIMITS = step_limits(0.45, 1e9, steady=True)
 
 
 def slippery(wall: WallPlane) -> WallPlane:
@@ -86,19 +89,59 @@ def test_lid_driven_cavity_has_the_published_centre_line():
     assert found == pytest.approx(np.array(published), abs=0.02)
 
 
-@pytest.mark.parametrize(("left_s", "stable_s"), [(5.0, 0.031), (5.0, 0.125), (5.0, 9.0), (0.4, 0.3)])
-def test_what_is_left_of_a_window_is_divided_in_equal_stable_steps(left_s: float, stable_s: float):
-    whole_s, steps = left_s, []
-    while left_s > 1e-9:
-        pairs, dt_s = chunk_pairs(left_s, stable_s, 20)
-        assert 1 <= pairs <= 20
-        steps += [dt_s] * 2 * pairs
-        left_s -= 2 * pairs * dt_s
+@pytest.mark.parametrize("steady", [True, False])
+@pytest.mark.parametrize("window_s", [0.05, 1.0, 7.0])
+def test_a_march_lives_through_its_windows_and_no_longer(window_s: float, steady: bool):
+    model = flat_room(8, 0.01, (as_it_is, as_it_is), (as_it_is, as_it_is), 1.0)
+    warm = jnp.broadcast_to(jnp.linspace(1.0, 0.0, 8)[:, None, None], model.grid.cells)
+    settings = MarchSettings(
+        longest_s=2 * window_s,
+        window_s=window_s,
+        tolerance=0.0,
+        level_ahead_s=0.0,
+        chunk_steps=4,
+        steady=steady,
+    )
+    state = MarchState(air_at_rest(model, warm, 0.1), courant=0.45)
 
-    assert sum(steps) == pytest.approx(whole_s, rel=1e-9)
-    assert max(steps) <= stable_s * (1 + 1e-5)
-    # No more than whole pairs, and equal chunks, ask for.
-    assert len(steps) <= whole_s / stable_s + 2 * (1 + whole_s / (40 * stable_s))
+    _, _, lived_s, steps = window(state.flow, model, settings, state, lambda: None)
+
+    assert float(lived_s.mean()) == pytest.approx(window_s, rel=1e-3)
+    assert steps >= 8
+    if not steady:
+        assert np.ptp(np.asarray(lived_s)) == pytest.approx(0.0, abs=1e-5 * window_s)
+
+
+def test_slow_air_takes_longer_steps_to_the_same_steady_state():
+    def moving(wall: WallPlane) -> WallPlane:
+        return eqx.tree_at(lambda w: w.tangent_m_s[0], wall, jnp.ones_like(wall.normal_m_s))
+
+    model = flat_room(16, 0.02, (as_it_is, as_it_is), (as_it_is, moving), 0.0)
+    start = air_at_rest(model, jnp.zeros(model.grid.cells), 0.1)
+    ends = [
+        march(start, model, MarchSettings(longest_s=40.0, window_s=2.0, tolerance=1e-5, steady=steady))
+        for steady in (True, False)
+    ]
+
+    assert ends[0].outcome is ends[1].outcome is Outcome.converged
+    assert ends[0].steps < 0.6 * ends[1].steps
+    for own, true in zip(ends[0].last.velocity, ends[1].last.velocity, strict=True):
+        np.testing.assert_allclose(own, true, atol=3e-4)
+
+
+def test_stratified_air_that_swings_comes_to_rest_sooner():
+    model = flat_room(16, 1e-5, (slippery, slippery), (slippery, slippery), 1.0)
+    height_m, along_m = model.grid.centres_m(2), model.grid.centres_m(0)
+    tilted = height_m[None, None, :] + 0.05 * np.cos(np.pi * along_m)[:, None, None]
+    start = air_at_rest(model, jnp.asarray(np.broadcast_to(tilted, model.grid.cells), jnp.float32), 0.0)
+
+    def speed(*, steady: bool) -> float:
+        settings = MarchSettings(
+            longest_s=20.0, window_s=2.0, tolerance=0.0, level_ahead_s=0.0, steady=steady
+        )
+        return max(float(jnp.abs(of).max()) for of in march(start, model, settings).last.velocity)
+
+    assert speed(steady=True) < 0.4 * speed(steady=False)
 
 
 def test_the_step_keeps_positive_weights_where_air_hardly_moves():
@@ -107,7 +150,7 @@ def test_the_step_keeps_positive_weights_where_air_hardly_moves():
     viscosity = model.viscosity(still)
     diffusive = max(float(viscosity.cells_m2_s.max()), float(model.diffusivity_m2_s(viscosity).max()))
 
-    own = 2.0 * float(longest_step_s(still, model, 0.45)) * diffusive
+    own = 2.0 * float(own_pace(still, model, LIMITS).shortest_s) * diffusive
     assert own * sum(1.0 / h**2 for h in model.grid.spacing_m) == pytest.approx(1.0, rel=1e-3)
 
 
@@ -119,7 +162,7 @@ def test_a_lid_over_air_at_rest_limits_the_step():
     still = air_at_rest(model, jnp.zeros(model.grid.cells), 0.1)
 
     # 2 m/s over cells of 1/8 m at a Courant number of 0.45: 28 ms; without the lid diffusion would allow 26 s.
-    assert 0.02 < float(longest_step_s(still, model, 0.45)) <= 0.45 / 16
+    assert 0.02 < float(own_pace(still, model, LIMITS).shortest_s) <= 0.45 / 16
 
 
 def test_a_march_that_diverges_ends_with_the_last_good_state():
@@ -127,7 +170,7 @@ def test_a_march_that_diverges_ends_with_the_last_good_state():
     start = air_at_rest(model, jnp.zeros(model.grid.cells), 0.1)
     broken = eqx.tree_at(lambda m: m.buoyancy_m_s2_k, model, jnp.float32(jnp.nan))
 
-    end = march(start, broken, MarchSettings(longest_s=10.0))
+    end = march(start, broken, MarchSettings(longest_s=10.0, window_s=5.0))
 
     assert end.outcome is Outcome.nonfinite
     assert bool(jnp.all(jnp.isfinite(end.last.velocity[2])))

@@ -40,9 +40,9 @@ SUPPLY = Inlet(
     temperature_k=303.15,
     velocity_m_s=(0.4, 0.0, 0.0),
 )
-SETTINGS = RoomSettings(cells=10, coarse_cells=8, vertices=12, settle_s=90.0, restart_s=30.0, refine_s=30.0)
+SETTINGS = RoomSettings(cells=10, coarse_cells=8, vertices=12, settle_s=300.0, restart_s=90.0, refine_s=90.0)
 # Where it does not matter how far the air has settled.
-SHORT = replace(SETTINGS, settle_s=20.0, restart_s=10.0, refine_s=10.0, rounds=2)
+SHORT = replace(SETTINGS, settle_s=60.0, restart_s=30.0, refine_s=30.0, rounds=2)
 
 
 def telling(told: list[dict]) -> Marches:
@@ -89,7 +89,7 @@ def true_room(where: Scene, heat: float = 0.0) -> Solution:
     vector = np.array([heat if name.startswith("heater_log_heat") else 0.0 for name in prior.names()])
     parameters = prior.parameters(vector)
     start = fine.at_rest(fine.model(parameters), np.zeros(fine.grid.cells[2]))
-    run = march_under(fine, parameters, start, 120.0, (TRUE_VERTICES,) * 3, Marches())
+    run = march_under(fine, parameters, start, 300.0, (TRUE_VERTICES,) * 3, Marches())
     fields, axis_m = run.fields, np.linspace(0.0, 2.0, TRUE_VERTICES)
     kelvin = 293.15 + fields.excess_k
     return Solution(axis_m, axis_m, axis_m, kelvin, fields.pressure_m2_s2, fields.velocity_m_s)
@@ -136,11 +136,12 @@ def test_images_repair_a_supply_that_was_entered_wrongly(moved: bool):
     problem = after_the_camera_moved(problem) if moved else problem
 
     reported: list[dict] = []
-    found = solve_room(problem, SETTINGS, Watch(lambda row, growing: reported.append(row)))
+    settings = replace(SETTINGS, cells=12, coarse_cells=9)
+    found = solve_room(problem, settings, Watch(lambda row, growing: reported.append(row)))
 
     (supply,) = (event for event in reported if "supply_1_m_s" in event)
     excess_k, speed_m_s = supply["supply_1_excess_k"], supply["supply_1_m_s"]
-    # Entered 12 K and 0.48 m/s; it has 10 K and 0.4 m/s. Ten cells an edge find the temperature and the heat, and
+    # Entered 12 K and 0.48 m/s; it has 10 K and 0.4 m/s. Twelve cells an edge find the temperature and the heat, and
     # make good a part of the speed only.
     assert excess_k == pytest.approx(10.0, abs=0.5)
     assert excess_k * speed_m_s == pytest.approx(4.0, rel=0.15)
@@ -293,7 +294,7 @@ def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothi
 
 
 # Between the steps that are tried, and on another grid.
-@pytest.mark.parametrize("deviations", [-1.7, 0.1, 1.3])
+@pytest.mark.parametrize("deviations", [-1.7, -0.2, 1.3])
 def test_what_a_stated_heater_gives_off_is_found_by_marches(deviations: float):
     supply = replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))
     panel = Heater(patch=Patch(wall="z_min", lower_m=(1.0, 0.6), upper_m=(1.6, 1.4)), temperature_k=333.15)

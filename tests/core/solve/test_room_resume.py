@@ -14,7 +14,7 @@ from core.watch import StoppedError, Watch
 from tests.core.solve.test_room import SUPPLY, measured, scene
 
 SETTINGS = RoomSettings(
-    cells=8, coarse_cells=6, vertices=9, settle_s=20.0, restart_s=10.0, refine_s=10.0, rounds=2
+    cells=8, coarse_cells=6, vertices=9, settle_s=60.0, restart_s=30.0, refine_s=30.0, rounds=2
 )
 
 
@@ -84,7 +84,7 @@ def test_stopped_anywhere_it_goes_on_to_bitwise_the_same_end(
         # Before anything is kept.
         (0, "", [set()]),
         # In the first march, after a window of it.
-        (2, "march the coarse room", [cut]),
+        (4, "march the coarse room", [cut]),
         # While two threads march, whether or not either has a window to keep.
         (questions.count // 4, "move one parameter", [some, some | cut]),
         # At the last question: in the last march, all others ended.
@@ -130,8 +130,8 @@ def test_a_march_that_ended_is_never_marched_again(problem: Problem, whole: Solu
 def test_a_stop_is_heard_at_the_next_chunk(problem: Problem):
     asked = Asked(20)
     stopped(problem, {}, asked)
-    # The one that heard it, and none that would go on; two threads may each hear it once.
-    assert asked.count <= 22
+    # The one that heard it, and none that would go on; two threads may each hear it once, and one may begin a march.
+    assert asked.count <= 23
 
 
 def test_what_is_kept_of_other_images_or_settings_is_refused(problem: Problem):
