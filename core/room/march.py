@@ -38,14 +38,16 @@ class MarchSettings:
 
     `least_s`: no march is called steady before it; just after a change of the supply windows hardly differ.
     `level_ahead_s`: how far the layers' heat balance is extrapolated after each window (`core.room.level`; 0: not at
-    all), from `settle_s` to two thirds of `longest_s`. No window begins after `most_steps`. A march that is not
-    `steady` is true in time: all cells take the same steps, and no wave is damped.
+    all), from `settle_s` to two thirds of `longest_s`. No window begins after `most_steps`. A march that ends by its
+    longest time counts as converged if its last windows differ by less than `settled`. One that is not `steady` is
+    true in time: all cells take the same steps, and no wave is damped.
     """
 
     longest_s: float = 60.0
     least_s: float = 0.0
     window_s: float = 15.0
     tolerance: float = 0.002
+    settled: float = 0.02
     courant: float = 0.45
     level_ahead_s: float = 20.0
     settle_s: float = 15.0
@@ -109,7 +111,7 @@ def march(
     outcome = None
     while outcome is None:
         if state.model_s >= settings.longest_s - 1e-6 or state.steps >= settings.most_steps:
-            outcome = Outcome.step_limit
+            outcome = Outcome.converged if state.change < settings.settled else Outcome.step_limit
             break
         state, outcome = _after_window(state, model, settings, check_stop)
         on_window(state)

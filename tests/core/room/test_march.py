@@ -189,7 +189,21 @@ def test_a_march_begins_no_window_after_its_most_steps():
     settings = MarchSettings(longest_s=10.0, window_s=1.0, tolerance=0.0, level_ahead_s=0.0, most_steps=100)
     end = march(start, model, settings)
 
-    # Windows of at least forty steps: the third is the last.
+    # Windows of at least forty steps: the third is the last, and it differs from the second.
     assert 100 <= end.steps <= 100 + 40
     assert end.model_s < 10.0
     assert end.outcome is Outcome.step_limit
+
+
+def test_a_march_that_changes_little_at_its_longest_time_has_converged():
+    def moving(wall: WallPlane) -> WallPlane:
+        return eqx.tree_at(lambda w: w.tangent_m_s[0], wall, jnp.ones_like(wall.normal_m_s))
+
+    model = flat_room(8, 0.02, (as_it_is, as_it_is), (as_it_is, moving), 0.0)
+    start = air_at_rest(model, jnp.zeros(model.grid.cells), 0.1)
+
+    def ended(longest_s: float) -> Outcome:
+        return march(start, model, MarchSettings(longest_s=longest_s, window_s=1.0, tolerance=0.0)).outcome
+
+    assert ended(2.0) is Outcome.step_limit
+    assert ended(20.0) is Outcome.converged
