@@ -28,7 +28,7 @@ from core.setting import SettingError, setting
 
 # Of the stable Courant number, in the first chunk of a room with objects.
 _FIRST_SHARE = 0.3
-# Of a window: what is left and is less counts as marched.
+# A window is over when less than this share of it is left.
 _NOTHING = 1e-5
 
 

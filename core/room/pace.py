@@ -54,7 +54,7 @@ class Pace(eqx.Module):
         return self.shortest_s * self.longer
 
     def faces_s(self, axis: int) -> Float[Array, "..."]:
-        """The step of the inner faces: that of the slower of two cells is as long as the faster one allows."""
+        """The step of the inner faces: the shorter one of the two cells beside."""
         return self.shortest_s * jnp.minimum(cut(self.longer, 0, -1, axis), cut(self.longer, 1, 0, axis))
 
 
@@ -73,9 +73,9 @@ def pace_of(rate_per_s: Cells, limits: StepLimits) -> Pace:
 def wave_damping_k(
     excess_k: Cells, heating_k_s: Cells, buoyancy_m_s2_k: Float[Array, ""], pace: Pace, grid: RoomGrid
 ) -> Float[Array, "nx ny inner"]:
-    """What the air at the inner faces between layers will gain until buoyancy counts; none where cold lies over warm.
+    """How much warmer the air between two layers will be some steps later; 0 where cold air lies over warm.
 
-    A wave of the frequency N loses N^2 tau dt of its velocity in a step.
+    With this added to T a wave of the frequency N loses N^2 tau dt of its velocity in a step; tau is how far ahead.
     """
     own_s = pace.faces_s(2)
     steeper = jnp.maximum(difference(excess_k, 2), 0.0) * (buoyancy_m_s2_k / grid.spacing_m[2])
