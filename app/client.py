@@ -131,17 +131,19 @@ class Client:
         """Return how far a view's picture moved since the reference; for the eyes."""
         return self._ask(ShiftResource, "GET", "/devices/camera/shift", query={"view": str(view)})
 
-    def projector(self) -> ProjectorResource:
-        """Return what the projector said when it was last asked."""
-        return self._ask(ProjectorResource, "GET", "/devices/projector")
+    def projector(self, view: int = 0) -> ProjectorResource:
+        """Return what a projector said when it was last asked, by the number of the first view that sees by it."""
+        return self._ask(ProjectorResource, "GET", "/devices/projector", query={"view": str(view)})
 
-    def connect_projector(self, experiment: str) -> ProjectorResource:
-        """Speak to the projector of an experiment's rig."""
-        return self._ask(ProjectorResource, "POST", "/devices/projector/connect", {"experiment": experiment})
+    def connect_projector(self, experiment: str, view: int = 0) -> ProjectorResource:
+        """Speak to the projector that lights a view of an experiment's rig."""
+        body = {"experiment": experiment, "view": view}
+        return self._ask(ProjectorResource, "POST", "/devices/projector/connect", body)
 
-    def disconnect_projector(self) -> ProjectorResource:
-        """Free the projector's line."""
-        return self._ask(ProjectorResource, "POST", "/devices/projector/disconnect")
+    def disconnect_projector(self, view: int = 0) -> ProjectorResource:
+        """Free a projector's line."""
+        query = {"view": str(view)}
+        return self._ask(ProjectorResource, "POST", "/devices/projector/disconnect", query=query)
 
     def change_projector(
         self,
@@ -149,14 +151,16 @@ class Client:
         source: str | None = None,
         muted: bool | None = None,
         frozen: bool | None = None,
+        view: int = 0,
     ) -> ProjectorResource:
-        """Switch power, source, mute or freeze."""
-        body = {"power": power, "source": source, "muted": muted, "frozen": frozen}
+        """Switch power, source, mute or freeze of a view's projector."""
+        body = {"power": power, "source": source, "muted": muted, "frozen": frozen, "view": view}
         return self._ask(ProjectorResource, "PATCH", "/devices/projector", body)
 
-    def wire(self, after_s: float = 0.0) -> list[WireLine]:
-        """List what went over the projector's line after a moment (Unix time)."""
-        return self._ask(list[WireLine], "GET", "/devices/projector/wire", query={"after_s": str(after_s)})
+    def wire(self, after_s: float = 0.0, view: int = 0) -> list[WireLine]:
+        """List what went over a projector's line after a moment (Unix time)."""
+        query = {"after_s": str(after_s), "view": str(view)}
+        return self._ask(list[WireLine], "GET", "/devices/projector/wire", query=query)
 
     def screen(self, view: int = 0) -> ScreenResource:
         """Return what the kiosk page of a projector shows, by the number of the first view that sees by it."""

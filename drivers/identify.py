@@ -13,8 +13,8 @@ _DICTIONARY = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
 MIN_CORRELATION = 0.8
 
 
-def identify_frame(rows: int, cols: int) -> Picture:
-    """Return a picture with a marker in each corner, a border one pixel wide and its own size in words.
+def identify_frame(rows: int, cols: int, name: str = "") -> Picture:
+    """Return a picture with a marker in each corner, a border one pixel wide, its own size in words, and a name.
 
     Raises DeviceSettingError for a size that has no room for the markers.
     """
@@ -27,10 +27,9 @@ def identify_frame(rows: int, cols: int) -> Picture:
         frame[row : row + side, col : col + side] = marker
     frame[[0, -1], :] = 255
     frame[:, [0, -1]] = 255
-    text, scale = f"{cols} x {rows}", min(rows, cols) / 300
-    (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 2)
-    at = ((cols - width) // 2, (rows + height) // 2)
-    return np.asarray(cv2.putText(frame, text, at, cv2.FONT_HERSHEY_SIMPLEX, scale, 0, 2), np.uint8)
+    _write(frame, f"{cols} x {rows}", rows // 2)
+    _write(frame, name, 5 * rows // 8)
+    return frame
 
 
 def locate(seen: Pixels, rows: int, cols: int) -> Float64[np.ndarray, "3 3"]:
@@ -74,6 +73,17 @@ def judge_seen(seen: Pixels, sent: Picture, camera_from_picture: Float64[np.ndar
         f"correlation of at least {MIN_CORRELATION:g} with the picture that was sent",
         "Check focus and light, that the right picture is shown, and that nothing stands in the way.",
     )
+
+
+def _write(frame: Picture, text: str, row: int) -> None:
+    """Write a line in the middle of the picture, its centre at a row; smaller where it is too long."""
+    rows, cols = frame.shape
+    scale = min(rows, cols) / 300
+    (width, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 2)
+    scale *= min(1.0, 0.9 * cols / max(width, 1))
+    (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 2)
+    at = ((cols - width) // 2, row + height // 2)
+    cv2.putText(frame, text, at, cv2.FONT_HERSHEY_SIMPLEX, scale, 0, 2)
 
 
 def _corners(rows: int, cols: int, side: int) -> list[tuple[int, int]]:

@@ -73,7 +73,7 @@ def create_app(config: ServiceConfig) -> FastAPI:
         services.desk.close()
         services.beside.close()
         services.cameras.close()
-        services.projector.close()
+        services.projectors.close()
 
     app = FastAPI(
         title="airlens",

@@ -25,6 +25,7 @@ from app.live.beside import LiveAir
 from app.rig.live_camera import LiveCamera
 from app.rig.live_cameras import LiveCameras
 from app.rig.live_projector import LiveProjector
+from app.rig.live_projectors import LiveProjectors
 
 
 @dataclass(frozen=True)
@@ -46,12 +47,17 @@ class Services:
     guide: CalibrationDesk
     together: TogetherDesk
     screens: KioskScreens
-    projector: LiveProjector
+    projectors: LiveProjectors
 
     @property
     def camera(self) -> LiveCamera:
         """The camera of the first view."""
         return self.cameras.first
+
+    @property
+    def projector(self) -> LiveProjector:
+        """The projector of the first view."""
+        return self.projectors.first
 
 
 def create_services(config: ServiceConfig) -> Services:
@@ -67,10 +73,10 @@ def create_services(config: ServiceConfig) -> Services:
     ledger = Ledger(config.jobs_folder)
     news = News(ledger)
     cameras = LiveCameras(news.tell, busy=lambda: bool(ledger.jobs(states=ACTIVE, limit=1)))
-    projector = LiveProjector(news.tell)
+    projectors = LiveProjectors(news.tell)
     beside = LiveAir(news.tell)
     screens = KioskScreens()
-    guide = CalibrationDesk(cameras, screens.of, news.tell, projector)
+    guide = CalibrationDesk(cameras, screens.of, news.tell, projectors)
     return Services(
         config,
         Access(config),
@@ -82,12 +88,12 @@ def create_services(config: ServiceConfig) -> Services:
         CurveCache(ledger),
         SolutionCache(),
         cameras,
-        CaptureDesk(cameras, news.tell, beside=beside, projector=projector),
+        CaptureDesk(cameras, news.tell, beside=beside, projectors=projectors),
         beside,
         guide,
         TogetherDesk(cameras, guide, news.tell),
         screens,
-        projector,
+        projectors,
     )
 
 

@@ -21,7 +21,7 @@ from app.experiment.views import lamp_number, opened_for, view_number
 from app.rig.conditions import Conditions, conditions_of
 from app.rig.lamps import lamps_beside
 from app.rig.live_cameras import LiveCameras
-from app.rig.live_projector import LiveProjector
+from app.rig.live_projectors import LiveProjectors
 from app.rig.open import open_camera, open_stage, panel_of
 from app.rig.stage import RealStage, Stage, StageTask, UnopenedStage
 from app.states import StateMachine
@@ -97,8 +97,8 @@ class CalibrationDesk:
 
     `tell(kind, body)` hears of progress.
 
-    Of several projectors before one camera all are dark but the one that is calibrated; `projector` is the one that
-    the service speaks to already.
+    Of several projectors before one camera all are dark but the one that is calibrated; `projectors` are those
+    that the service speaks to already.
     """
 
     def __init__(
@@ -106,10 +106,10 @@ class CalibrationDesk:
         live: LiveCameras,
         screen_of: Callable[[int], PatternDisplay],
         tell: Callable[[str, Mapping[str, Any]], object],
-        projector: LiveProjector | None = None,
+        projectors: LiveProjectors | None = None,
     ) -> None:
         self._live, self._screen_of, self._tell = live, screen_of, tell
-        self._projector = projector
+        self._projectors = projectors
         self._status = GuideStatus()
         self._skipped: dict[tuple[str, StepName, str], tuple[StageTask, ...]] = {}
         self._lock = threading.Lock()
@@ -247,7 +247,7 @@ class CalibrationDesk:
         view = view_number(experiment, plan.camera)
         display, panel = self._thrown(experiment, view)
         if display is not None:
-            lamps_beside(experiment, self._projector).light(view)
+            lamps_beside(experiment, self._projectors).light(view)
         with shown_stage(self._live, experiment, plan.board, view) as stage:
             if not isinstance(stage, RealStage):
                 yield stage

@@ -27,7 +27,7 @@ from app.live.beside import LiveAir
 from app.rig.conditions import Conditions
 from app.rig.lamps import lamps_beside
 from app.rig.live_cameras import LiveCameras
-from app.rig.live_projector import LiveProjector
+from app.rig.live_projectors import LiveProjectors
 from app.rig.open import AirState, air_of, open_camera
 from app.states import StateMachine
 from drivers.burst import BurstOutcome, CapturePlan, Progress
@@ -123,7 +123,7 @@ class CaptureDesk:
     """Takes captures with the cameras of `live`; `tell(kind, body)` hears of state and progress, and never raises.
 
     `opener` opens the camera of an experiment's view. `beside` looks at the bursts of orders that ask for it.
-    `projector` is the one that the service speaks to already.
+    `projectors` are those that the service speaks to already.
     """
 
     def __init__(
@@ -132,10 +132,10 @@ class CaptureDesk:
         tell: Callable[[str, Mapping[str, Any]], object],
         opener: Callable[[Experiment, AirState, int, int | None], Camera] = open_camera,
         beside: LiveAir | None = None,
-        projector: LiveProjector | None = None,
+        projectors: LiveProjectors | None = None,
     ) -> None:
         self._live, self._tell, self._opener, self._beside = live, tell, opener, beside
-        self._projector = projector
+        self._projectors = projectors
         self._status = DeskStatus()
         self._lock = threading.RLock()
         self._now: _Run | None = None
@@ -167,7 +167,7 @@ class CaptureDesk:
                         watch,
                         name,
                         opens,
-                        lamps_beside(experiment, self._projector),
+                        lamps_beside(experiment, self._projectors),
                     ),
                 )
 
@@ -186,7 +186,7 @@ class CaptureDesk:
                 reserve(experiment.captures_folder / name, plan)
 
             def takes(camera: Camera, watch: BurstWatch, opens: OpensView) -> tuple[CaptureEvent, str]:
-                lamps = lamps_beside(experiment, self._projector)
+                lamps = lamps_beside(experiment, self._projectors)
                 taken = retake(camera, experiment, parts, number, told, watch, name, lamps)
                 return _ending(Order(plan), [taken])
 

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, closing, nullcontext
 from app.errors import AirlensError
 from app.experiment.folder import Experiment
 from app.experiment.views import lamp_number, view_names
-from app.rig.live_projector import LiveProjector
+from app.rig.live_projectors import LiveProjectors
 from app.rig.open import open_projector
 from drivers.projector.protocol import Projector
 
@@ -55,11 +55,11 @@ class Lamps:
             )
 
 
-def lamps_beside(experiment: Experiment, held: LiveProjector | None) -> Lamps:
-    """The projectors, where the first one's line may be held by a service itself."""
+def lamps_beside(experiment: Experiment, live: LiveProjectors | None) -> Lamps:
+    """The projectors, where a service itself may hold the lines of some."""
 
     def opens(view: int) -> AbstractContextManager[Projector]:
-        found = None if held is None or view != 0 else held.held(experiment.folder.name)
+        found = None if live is None else live.held(experiment.folder.name, view)
         return closing(open_projector(experiment, view)) if found is None else nullcontext(found)
 
     return Lamps(experiment, opens)

@@ -38,7 +38,10 @@ REASONS = {
 
 @dataclass(frozen=True)
 class ProjectorReport:
-    """What is known: `said` by the projector itself; `since_s` (Unix time) is when the state began."""
+    """What is known: `said` by the projector itself; `since_s` (Unix time) is when the state began.
+
+    `view` is the number of the first view that sees by it.
+    """
 
     state: ProjectorState = ProjectorState.closed
     source: str | None = None
@@ -46,18 +49,23 @@ class ProjectorReport:
     capabilities: tuple[str, ...] = ()
     since_s: float = 0.0
     reason: str = ""
+    view: int = 0
 
 
 class LiveProjector:
-    """The one projector of a service. `tell(kind, body)` hears of every change of state."""
+    """One projector of a service, that of `view`. `tell(kind, body)` hears of every change of state."""
 
     def __init__(
-        self, tell: Callable[[str, Mapping[str, Any]], object], idle_s: float = 5.0, switching_s: float = 1.0
+        self,
+        tell: Callable[[str, Mapping[str, Any]], object],
+        idle_s: float = 5.0,
+        switching_s: float = 1.0,
+        view: int = 0,
     ) -> None:
         self._tell = tell
         self._idle_s, self._switching_s = idle_s, switching_s
         self._projector: Projector | None = None
-        self._report = ProjectorReport()
+        self._report = ProjectorReport(view=view)
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self._lock = threading.Lock()
@@ -128,6 +136,13 @@ class LiveProjector:
     def _change(self, new: ProjectorReport) -> None:
         before = self._report
         changed = new.state != before.state
-        self._report = replace(new, since_s=time.time() if changed else before.since_s)
+        since_s = time.time() if changed else before.since_s
+        self._report = replace(new, since_s=since_s, view=before.view)
         if changed or new.reason != before.reason:
-            self._tell("device", {"device": "projector", "state": new.state.value, "reason": new.reason})
+            body = {
+                "device": "projector",
+                "view": before.view,
+                "state": new.state.value,
+                "reason": new.reason,
+            }
+            self._tell("device", body)

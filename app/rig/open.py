@@ -8,7 +8,7 @@ from jaxtyping import Float32
 
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
-from app.experiment.rig_settings import CameraSettings, SimulatedCameraSettings
+from app.experiment.rig_settings import CameraSettings, ProjectorSettings, SimulatedCameraSettings
 from app.experiment.views import camera_number
 from app.rig.cameras import open_real
 from app.rig.inventory import found_cameras
@@ -82,9 +82,9 @@ def air_of(role: CaptureRole) -> AirState:
 
 def open_projector(experiment: Experiment, view: int = 0) -> Projector:
     """Return the projector of a view; its line opens when it is first asked. Raises BadInputError."""
-    rig, name = experiment.settings.rig, experiment.settings.scene.views[view].name
-    settings = rig.projector if view == 0 else (rig.projectors or {}).get(name)
+    settings = named_projector(experiment, view)
     if settings is None:
+        name = experiment.settings.scene.views[view].name
         whose, table = (
             ("", "[rig.projector]") if view == 0 else (f" for {name!r}", f'[rig.projectors."{name}"]')
         )
@@ -93,6 +93,12 @@ def open_projector(experiment: Experiment, view: int = 0) -> Projector:
             f'{table} with url = "pjlink://ADDRESS" or "escvp21:/dev/ttyUSB0".'
         )
     return _twin(settings.url) if settings.url.startswith("simulated:") else open_real_projector(settings.url)
+
+
+def named_projector(experiment: Experiment, view: int = 0) -> ProjectorSettings | None:
+    """The projector that the experiment names for a view; None where it names none."""
+    rig, name = experiment.settings.rig, experiment.settings.scene.views[view].name
+    return rig.projector if view == 0 else (rig.projectors or {}).get(name)
 
 
 def _twin(url: str) -> Projector:

@@ -6,6 +6,7 @@ import numpy as np
 
 from app.errors import BadInputError
 from app.experiment.folder import Experiment
+from app.experiment.views import projectors, view_names
 from core.pattern import make_pattern
 from core.scene import CheckerPattern, ProjectedPattern
 from drivers.display import Picture
@@ -34,12 +35,16 @@ def projected(experiment: Experiment, view: int = 0) -> ProjectedPattern:
 
 
 def pattern_picture(experiment: Experiment, name: PatternName, view: int = 0) -> Picture:
-    """Return the picture at the native size of a view's projector. Raises BadInputError, SettingError."""
+    """Return the picture at the native size of a view's projector; of several, `identify` shows the view's name.
+
+    Raises BadInputError, SettingError.
+    """
     light = projected(experiment, view)
     cols, rows = light.projector.width_px, light.projector.height_px
     if name in LEVELS:
         return np.full((rows, cols), LEVELS[name], np.uint8)
     if name == "identify":
-        return identify_frame(rows, cols)
+        named = view_names(experiment)[view] if len(projectors(experiment)) > 1 else ""
+        return identify_frame(rows, cols, named)
     pattern = light.pattern if name == "scene" else FOCUS
     return np.rint(255 * make_pattern(pattern, rows, cols)).astype(np.uint8)

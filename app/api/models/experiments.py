@@ -32,7 +32,8 @@ class SeenWallLine(WireModel):
     """A view: what it is called, the wall that it looks at, and whose camera takes its pictures.
 
     `camera` is the number of the view whose camera is opened for it, mostly its own; `camera_of` names that view
-    where it is another one. `light` is what patterns the wall, `lamp` the number of the first view that has it.
+    where it is another one. `light` is what patterns the wall, `lamp` the number of the first view that has it, and
+    `spoken_to` whether the rig names how that one's projector is reached.
     """
 
     name: str
@@ -41,6 +42,7 @@ class SeenWallLine(WireModel):
     camera_of: str | None = None
     light: Literal["texture", "projector"]
     lamp: int
+    spoken_to: bool
 
 
 class ExperimentLine(WireModel):

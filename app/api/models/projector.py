@@ -8,9 +8,13 @@ from app.api.models.strict import Named, WireModel
 
 
 class ProjectorResource(WireModel):
-    """The projector; what it does not know is null. `for_s` is how long it has been in this state."""
+    """A projector; what it does not know is null. `for_s` is how long it has been in this state.
+
+    `view` is the number of the first view that sees by it.
+    """
 
     device: Literal["projector"] = "projector"
+    view: int
     state: Literal["closed", "standby", "warming", "on", "cooling", "fault", "silent", "lost"]
     experiment: str | None
     name: str | None
@@ -26,14 +30,16 @@ class ProjectorResource(WireModel):
 
 
 class OpenProjector(WireModel):
-    """Which rig's projector to speak to."""
+    """Which rig's projector to speak to, by the number of a view that sees by it."""
 
     experiment: Named
+    view: int = Field(default=0, ge=0, lt=100)
 
 
 class ProjectorChange(WireModel):
-    """What to tell it; what is left out stays. Power takes minutes: `state` says how far it is."""
+    """What to tell a view's projector; what is left out stays. Power takes minutes: `state` says how far it is."""
 
+    view: int = Field(default=0, ge=0, lt=100)
     power: Literal["on", "off"] | None = None
     source: str | None = Field(default=None, min_length=1, max_length=16, pattern="^[A-Za-z0-9]+$")
     muted: bool | None = None

@@ -30,9 +30,9 @@ Stretch = Annotated[Literal["0", "1"], Query(description="1 stretches the contra
 
 @router.get("/devices")
 async def list_devices(given: Given) -> list[CameraResource | ProjectorResource]:
-    """List the devices and their states: the cameras by their view's number, then the projector."""
+    """List the devices and their states: the cameras by their view's number, then the projectors likewise."""
     cameras = [CameraResource.of(one.status) for one in given.cameras.known]
-    return [*cameras, projector_resource(given.projector.report)]
+    return [*cameras, *(projector_resource(one.report) for one in given.projectors.known)]
 
 
 @router.get("/devices/camera")

@@ -30,6 +30,7 @@ from app.experiment.plan import PLAN_FILE
 from app.experiment.views import lamp_number, opened_for
 from app.files.reading import reading
 from app.files.toml import to_plain
+from app.rig.open import named_projector
 from app.simulate.rehearsal import Rehearsal, rehearse
 from app.whereabouts import next_step
 from core.scene import Light, Marks, ProjectedPattern, Scene
@@ -157,6 +158,7 @@ def _line(experiment: Experiment) -> ExperimentLine:
                 camera_of=view.camera_of,
                 light=_kind(view.light or settings.scene.light),
                 lamp=lamp_number(experiment, number),
+                spoken_to=named_projector(experiment, lamp_number(experiment, number)) is not None,
             )
             for number, view in enumerate(settings.scene.views)
         ],

@@ -6,21 +6,16 @@ import cv2
 from fastapi import APIRouter, Query, Response
 
 from app.api.models.screen import ScreenResource, ShowPattern, State
+from app.api.resources.projector import ViewNumber, lamp_of
 from app.api.services import Given, Services
 from app.api.wire.bodies import body
 from app.api.wire.identifier import Identifier
-from app.api.wire.problems import ApiError
-from app.experiment.folder import Experiment
-from app.experiment.views import lamp_number
 from app.kiosk.screen import KioskScreen
-from app.kiosk.screens import MOST, page_of
+from app.kiosk.screens import page_of
 from app.rig.patterns import PatternName, pattern_picture
 from drivers.display import Picture
 
 router = APIRouter(tags=["devices"])
-ViewNumber = Annotated[
-    int, Query(ge=0, lt=MOST, description="Whose projector, by the view's number, from 0.")
-]
 PICTURE = body("image/png", "The pattern, made smaller for the eyes.")
 
 
@@ -34,7 +29,7 @@ def read_screen(given: Given, view: ViewNumber = 0) -> ScreenResource:
 def show_pattern(given: Given, wanted: ShowPattern) -> ScreenResource:
     """Put a pattern on the kiosk page of a view's projector; it is there as soon as `state` is `showing`."""
     experiment = given.folders.open(wanted.experiment)
-    number = _lamp(experiment, wanted.view)
+    number = lamp_of(experiment, wanted.view)
     given.screens.of(number).put(pattern_picture(experiment, wanted.pattern, number))
     return _resource(given, number)
 
@@ -56,16 +51,8 @@ def preview_pattern(
 ) -> Response:
     """Return a pattern of a view's projector as a small picture."""
     found = given.folders.open(experiment)
-    picture = pattern_picture(found, pattern, _lamp(found, view))
+    picture = pattern_picture(found, pattern, lamp_of(found, view))
     return Response(_small_png(picture, width), media_type="image/png")
-
-
-def _lamp(experiment: Experiment, view: int) -> int:
-    """The number of the view whose projector lights that view. Raises ApiError where there is no such view."""
-    views = len(experiment.settings.scene.views)
-    if view >= views:
-        raise ApiError("not_found", f"The experiment has {views} views; there is no view {view}.")
-    return lamp_number(experiment, view)
 
 
 def _small_png(picture: Picture, width: int) -> bytes:
