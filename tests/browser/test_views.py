@@ -145,6 +145,33 @@ def test_each_projector_has_its_kiosk_and_its_pattern_on_rig(station: Station, o
     assert watched.complaints == []
 
 
+def test_each_projector_is_seen_switched_and_freed_on_rig(station: Station, opens: Opens):
+    two_views(station, light="projector")
+    watched = opens(station.address)
+    page = watched.page
+    go_to(page, "Rig")
+    section, footer = page.locator("section.projector"), page.locator("footer")
+    section.get_by_role("button", name="Connect projector").click()
+    expect(footer).to_contain_text(f"projector of {VIEWS[0]} standby")
+    section.get_by_label("Projector").select_option(f"of {VIEWS[1]}: wall x_max")
+    expect(section).to_contain_text(f"{VIEWS[1]}: closed")
+    section.get_by_role("button", name="Connect projector").click()
+    section.get_by_role("button", name="Lamp on").click()
+    expect(footer).to_contain_text(f"projector of {VIEWS[1]} on")
+    section.get_by_role("button", name="Mute").click()
+    expect(section.get_by_role("button", name="Mute")).to_have_attribute("aria-pressed", "true")
+    section.get_by_label("Wire log").check()
+    expect(section.locator(".wire")).to_contain_text("%1AVMT 11")
+    expect(section).to_contain_text(f"{VIEWS[0]}: standby")
+    snapshot(page, "views-projectors")
+    projectors = station.app.state.services.projectors
+    assert [one.report.said.muted for one in projectors.known] == [None, True]
+    section.get_by_role("button", name="Free the line").click()
+    expect(section).to_contain_text(f"{VIEWS[1]}: closed")
+    assert [one.report.state for one in projectors.known] == ["standby", "closed"]
+    assert watched.complaints == []
+
+
 def test_each_wall_has_its_print_on_rig(station: Station, opens: Opens):
     made = two_views(station)
     folders = station.app.state.services.folders

@@ -42,7 +42,8 @@ class Bench {
   experiment = $state<string | null>(null);
   /** The cameras by their view's number; `camera` is the first view's. */
   cameras = $state.raw<CameraResource[]>([]);
-  projector = $state.raw<ProjectorResource | null>(null);
+  /** The projectors by the number of the first view that sees by each. */
+  projectors = $state.raw<ProjectorResource[]>([]);
   desk = $state.raw<DeskResource | null>(null);
   captures = $state.raw<CaptureResource[]>([]);
   jobs = $state.raw<JobResource[]>([]);
@@ -91,11 +92,19 @@ class Bench {
   }
 
   current = $derived(this.experiments.find((one) => one.experiment === this.experiment) ?? null);
+  /** What lights the walls from projectors, by the number of the first view that sees by each. */
+  lamps = $derived(
+    [...(this.current?.views ?? []).entries()].filter(
+      ([number, one]) => one.lamp === number && one.light === "projector",
+    ),
+  );
   active = $derived(this.jobs.filter((job) => ACTIVE.includes(job.state)));
   camera = $derived(this.cameras.find((one) => one.view === 0) ?? null);
-  /** The camera and the projector, where they are connected for this experiment. */
+  /** The camera and the projectors, where they are connected for this experiment. */
   ownCamera = $derived(this.camera?.experiment === this.experiment ? this.camera : null);
-  ownProjector = $derived(this.projector?.experiment === this.experiment ? this.projector : null);
+  ownProjectors = $derived(
+    this.projectors.filter((one) => one.state !== "closed" && one.experiment === this.experiment),
+  );
   ownDesk = $derived(this.desk?.experiment === this.experiment ? this.desk : null);
   finished = $derived(this.captures.filter((one) => one.state === "finished"));
   /** How many bursts the newest flow is of. */
@@ -174,7 +183,7 @@ class Bench {
   async refreshDevices(): Promise<void> {
     const devices = await ask("GET /devices", {});
     this.cameras = devices.filter((one): one is CameraResource => one.device === "camera");
-    this.projector = devices.find((one): one is ProjectorResource => one.device === "projector") ?? null;
+    this.projectors = devices.filter((one): one is ProjectorResource => one.device === "projector");
   }
 
   async refreshExperiment(): Promise<void> {
@@ -283,12 +292,18 @@ class Bench {
     await this.refreshDevices();
   }
 
-  async connectProjector(): Promise<void> {
-    this.projector = await ask("POST /devices/projector/connect", {}, { experiment: this.here });
+  /** Puts what is known of a projector in its place. */
+  putProjector(projector: ProjectorResource): void {
+    const others = this.projectors.filter((one) => one.view !== projector.view);
+    this.projectors = [...others, projector].sort((a, b) => a.view - b.view);
   }
 
-  async disconnectProjector(): Promise<void> {
-    this.projector = await ask("POST /devices/projector/disconnect", {});
+  async connectProjector(view: number): Promise<void> {
+    this.putProjector(await ask("POST /devices/projector/connect", {}, { experiment: this.here, view }));
+  }
+
+  async disconnectProjector(view: number): Promise<void> {
+    this.putProjector(await ask("POST /devices/projector/disconnect", { view }));
   }
 
   async calibrate(): Promise<void> {
