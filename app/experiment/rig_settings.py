@@ -186,6 +186,10 @@ class RigSettings(Strict):
         """The device files and hosts that this rig opens; simulated twins open none."""
         cameras = (self.camera, *(self.cameras or {}).values())
         camera = tuple(one.device for one in cameras if isinstance(one, RealCameraSettings))
+        return camera + tuple(url for url in self.projector_urls if not url.startswith("simulated:"))
+
+    @property
+    def projector_urls(self) -> tuple[str, ...]:
+        """The addresses of the projectors that are named, the first view's before the others'."""
         first = () if self.projector is None else (self.projector,)
-        named = tuple(one.url for one in (*first, *(self.projectors or {}).values()))
-        return camera + tuple(url for url in named if not url.startswith("simulated:"))
+        return tuple(one.url for one in (*first, *(self.projectors or {}).values()))

@@ -22,16 +22,15 @@ UNTOLD = Conditions()
 
 
 def conditions_of(settings: ExperimentSettings | None, told: Conditions) -> Conditions:
-    """What the operator tells; else the scene's air, and how long ago the rig's lamp was lit."""
+    """What the operator tells; else the scene's air, and how long ago the rig's lamp was lit (of several, the last)."""
     if settings is None:
         return told
     ambient_k, minutes = told.ambient_temperature_k, told.minutes_on
     if ambient_k is None:
         ambient_k = settings.scene.air.ambient_temperature_k
-    projector = settings.rig.projector
-    if minutes is None and projector is not None:
-        lit_s = LampGuard(journal=lamp_journal(projector.url)).on_s
-        minutes = None if lit_s is None else lit_s / 60
+    if minutes is None:
+        lit_s = [LampGuard(journal=lamp_journal(url)).on_s for url in settings.rig.projector_urls]
+        minutes = min((one / 60 for one in lit_s if one is not None), default=None)
     return Conditions(ambient_k, minutes)
 
 

@@ -87,9 +87,9 @@ def import_captures(given: Given, experiment: Identifier, new: NewImport) -> lis
     found = given.folders.open(experiment)
     files: dict[TakenBy, list[Path]] = {}
     for one in new.pictures:
-        files[TakenBy(one.role, one.view)] = [
+        files.setdefault(TakenBy(one.role, one.view), []).extend(
             path for upload in one.uploads for path in _pictures(given, upload)
-        ]
+        )
     lossy = [
         TakenBy(one.role, one.view) for one in new.pictures if "jpeg" in map(given.uploads.kind, one.uploads)
     ]

@@ -100,15 +100,18 @@ def test_a_flow_says_whether_its_exposure_is_the_references(experiment, exposure
 def test_the_lamps_journal_tells_how_long_it_has_been_on(experiment, tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     now_s = datetime.now(UTC).timestamp()
-    url = "escvp21:/dev/ttyUSB0"
-    journal = tmp_path / ".local" / "state" / "airlens" / "lamp-escvp21--dev-ttyUSB0.json"
-    LampGuard(journal=journal, now_s=lambda: now_s - 1800).lit()
-    settings = experiment.settings.model_copy(
-        update={"rig": RigSettings(projector=ProjectorSettings(url=url))}
-    )
-    known = conditions_of(settings, Conditions())
-    assert known.minutes_on == pytest.approx(30, abs=0.2)
-    assert known.ambient_temperature_k == settings.scene.air.ambient_temperature_k
+    state = tmp_path / ".local" / "state" / "airlens"
+    for port, lit_s in ((0, now_s - 1800), (1, now_s - 600)):
+        journal = state / f"lamp-escvp21--dev-ttyUSB{port}.json"
+        LampGuard(journal=journal, now_s=lambda at_s=lit_s: at_s).lit()
+    first, further = (ProjectorSettings(url=f"escvp21:/dev/ttyUSB{port}") for port in (0, 1))
+    # Of several lamps, the one that was lit last.
+    for further_ones, minutes in ((None, 30), ({"second": further}, 10)):
+        rig = RigSettings(projector=first, projectors=further_ones)
+        settings = experiment.settings.model_copy(update={"rig": rig})
+        known = conditions_of(settings, Conditions())
+        assert known.minutes_on == pytest.approx(minutes, abs=0.2)
+        assert known.ambient_temperature_k == settings.scene.air.ambient_temperature_k
 
 
 def test_the_camera_sees_what_the_simulated_projector_shows(tmp_path):
