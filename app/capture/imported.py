@@ -19,6 +19,7 @@ from app.experiment.folder import Experiment, interrupted, new_id
 from app.experiment.recorder import CaptureRecorder
 from app.experiment.views import view_names, view_number
 from app.files.lock import locked
+from app.files.provenance import sha256
 from app.rig.conditions import UNTOLD, Conditions, conditions_of, known_pairs
 from drivers.burst import BurstOutcome, CapturePlan, CaptureRole
 from drivers.verdict import Verdict
@@ -68,7 +69,8 @@ def import_files(
     _check_apart(given)
     for shown, files in given.items():
         _check_size(experiment, PictureFiles(files, bits), shown.role, views[shown])
-        _check_new(experiment, PictureFiles(files, bits), shown.role, views[shown])
+        with_it = {views[one] for one in given if one.role == shown.role}
+        _check_new(experiment, PictureFiles(files, bits), shown.role, views[shown], with_it)
     taken: dict[Path | None, TakenBurst] = {}
     for shown, files in sorted(given.items(), key=lambda one: (ROLES.index(one[0].role), views[one[0]])):
         with PictureFiles(files, bits) as pictures:
@@ -126,31 +128,39 @@ def _waiting(experiment: Experiment, role: CaptureRole) -> Path | None:
 
 
 def _check_apart(given: Mapping[TakenBy, list[Path]]) -> None:
-    """Raise BadInputError for a picture that is named twice."""
-    seen: dict[Path, TakenBy] = {}
+    """Raise BadInputError for a picture that is named twice, or is in two views' files."""
+    seen: dict[object, TakenBy] = {}
+    several = len({shown.view for shown in given}) > 1
     for shown, files in given.items():
         for file in files:
-            other = seen.setdefault(file.resolve(), shown)
-            if other != shown:
-                raise BadInputError(
-                    f"{file} is named as {_said(other)} and as {_said(shown)}. Keep the pictures of each in a folder "
-                    "of their own."
-                )
+            content = [(shown.role, sha256(file))] if several else []
+            for known in (file.resolve(), *content):
+                other = seen.setdefault(known, shown)
+                if other != shown:
+                    raise BadInputError(
+                        f"{file} is named as {_said(other)} and as {_said(shown)}. Keep the pictures of each in a "
+                        "folder of their own."
+                    )
 
 
 def _said(shown: TakenBy) -> str:
     return shown.role if shown.view is None else f"{shown.role} of {shown.view!r}"
 
 
-def _check_new(experiment: Experiment, pictures: PictureFiles, role: CaptureRole, view: int) -> None:
-    """Raise BadInputError for a picture that the waiting capture has as another view's."""
+def _check_new(
+    experiment: Experiment, pictures: PictureFiles, role: CaptureRole, view: int, with_it: Collection[int]
+) -> None:
+    """Raise BadInputError for a picture that the waiting capture has as another view's, and keeps.
+
+    `with_it` are the views whose pictures of that role are given now.
+    """
     folder, names = _waiting(experiment, role), view_names(experiment)
     if folder is None:
         return
     own = {file["sha256"]: file["name"] for file in pictures.origin["files"]}
     for number, part in parts_of(folder, names).views.items():
         twice = own.keys() & {file["sha256"] for file in part.get("files", ())}
-        if number != view and twice:
+        if number not in with_it and twice:
             raise BadInputError(
                 f"{own[min(twice)]} was imported as the {role} of {names[number]!r} already. Give the pictures of "
                 f"{names[view]!r}, or import those of {names[number]!r} again: they then replace the wrong ones."

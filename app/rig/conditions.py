@@ -22,7 +22,7 @@ UNTOLD = Conditions()
 
 
 def conditions_of(settings: ExperimentSettings | None, told: Conditions) -> Conditions:
-    """What the operator tells; else the scene's air, and how long ago the rig's lamp was lit (of several, the last)."""
+    """What the operator tells; else the scene's air, and how long ago the rig's lamp was lit, of several the last."""
     if settings is None:
         return told
     ambient_k, minutes = told.ambient_temperature_k, told.minutes_on

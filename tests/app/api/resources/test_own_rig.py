@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import cv2
+import httpx
 import numpy as np
 import pytest
 import tifffile
@@ -105,20 +106,30 @@ def test_dropped_pictures_become_captures_as_import_makes_them(client: Client, l
     assert client.uploads() == [] or not {one.upload for one in client.uploads()} & {*sent["flow"]}
 
 
-def test_pictures_of_two_cameras_are_one_capture_once_both_are_there(
-    client: Client, live: Live, tmp_path: Path
-):
+@pytest.fixture
+def two_cameras(client: Client, live: Live) -> str:
+    """An experiment with two views, `camera` and `second`, of 64 x 48 px each."""
     made = client.create_experiment(camera_px=64).experiment
     found = open_experiment(live.app.state.services.folders.folder(made))
     (first,) = found.settings.scene.views
     scene = replace(found.settings.scene, views=(first, replace(first, name="second")))
     save_settings(found.folder, found.settings.model_copy(update={"scene": scene}))
+    return made
+
+
+def uploaded(client: Client, folder: Path, shift: int, shape: tuple[int, int] = (48, 64)) -> str:
+    """The upload of a TIFF of four pictures."""
+    path = folder / f"{shift}.tif"
+    tifffile.imwrite(path, np.stack(pictures(shape, shift)), photometric="minisblack")
+    return client.upload(path).upload
+
+
+def test_pictures_of_two_cameras_are_one_capture_once_both_are_there(
+    client: Client, two_cameras: str, tmp_path: Path
+):
+    made = two_cameras
     assert [one.name for one in client.experiment(made).views] == ["camera", "second"]
-    uploads = []
-    for shift in (0, 1):
-        path = tmp_path / f"{shift}.tif"
-        tifffile.imwrite(path, np.stack(pictures((48, 64), shift)), photometric="minisblack")
-        uploads.append(client.upload(path).upload)
+    uploads = [uploaded(client, tmp_path, shift) for shift in (0, 1)]
     with pytest.raises(ServiceError, match="2 views: 'camera', 'second'"):
         client.import_captures(made, {"reference": uploads[:1]})
     (waiting,) = client.import_captures(made, {"reference": uploads[:1]}, view="second")
@@ -131,6 +142,58 @@ def test_pictures_of_two_cameras_are_one_capture_once_both_are_there(
     np.testing.assert_allclose(mean, np.mean(pictures((48, 64), 0), axis=0) / (2**16 - 1), atol=1e-6)
     with pytest.raises(ServiceError, match="has 2 views"):
         client.capture_image(made, whole.capture, view=2)
+
+
+def imported(live: Live, experiment: str, *pictures: tuple[str, str, list[str]]) -> httpx.Response:
+    """The answer to an import of several cameras at once: role, view and uploads of each."""
+    sent = [{"role": role, "view": view, "uploads": uploads} for role, view, uploads in pictures]
+    with live.client() as asking:
+        return asking.post(f"/api/experiments/{experiment}/captures/imported", json={"pictures": sent})
+
+
+def test_all_cameras_pictures_come_in_one_request_and_what_is_refused_stays(
+    client: Client, live: Live, two_cameras: str, tmp_path: Path
+):
+    first, second, again, other = (uploaded(client, tmp_path, shift) for shift in (0, 1, 1, 2))
+    wide = uploaded(client, tmp_path, 3, (48, 100))
+    for views, words in (
+        ((("flow", "camera", [first]), ("flow", "second", [wide])), "100 x 48 px; the camera 'second'"),
+        (
+            (("flow", "camera", [second]), ("flow", "second", [again])),
+            "flow of 'camera' and as flow of 'second'",
+        ),
+        ((("flow", "camera", [first]), ("flow", "third", [second])), "no view 'third'"),
+    ):
+        refused = imported(live, two_cameras, *views)
+        assert words in refused.json()["detail"], refused.text
+    assert client.captures(two_cameras) == []
+    assert {first, second, again, wide} <= {one.upload for one in client.uploads()}
+    # Two lists of one camera are one list.
+    whole = imported(
+        live,
+        two_cameras,
+        ("flow", "camera", [first]),
+        ("flow", "second", [second]),
+        ("flow", "camera", [other]),
+    )
+    (taken,) = whole.json()
+    assert (taken["state"], taken["missing"]) == ("finished", [])
+    assert [(one["view"], one["frames"]) for one in taken["views"]] == [("camera", 8), ("second", 4)]
+
+
+def test_cameras_that_were_confused_are_put_right_together(
+    client: Client, live: Live, two_cameras: str, tmp_path: Path
+):
+    wrong, of_camera, of_second = (uploaded(client, tmp_path, shift) for shift in (1, 0, 1))
+    assert imported(live, two_cameras, ("reference", "camera", [wrong])).json()[0]["missing"] == ["second"]
+    alone = imported(live, two_cameras, ("reference", "second", [of_second]))
+    assert "was imported as the reference of 'camera' already" in alone.json()["detail"]
+    right = (("reference", "camera", [of_camera]), ("reference", "second", [of_second]))
+    (taken,) = imported(live, two_cameras, *right).json()
+    assert taken["state"] == "finished"
+    for view in (0, 1):
+        mean = client.capture_image(two_cameras, taken["capture"], view=view)
+        np.testing.assert_allclose(mean, np.mean(pictures((48, 64), view), axis=0) / (2**16 - 1), atol=1e-6)
 
 
 def test_pictures_of_a_wrong_size_are_refused_with_both_sizes_and_jpeg_is_said_to_cost(
