@@ -13,6 +13,7 @@ from app.client import Client
 from tests.browser.conftest import Opens, Station, snapshot
 from tests.browser.test_faults import go_to
 from tests.browser.test_story import PAINTED, next_step
+from tests.browser.two_views import VIEWS, two_views
 
 FRAMES = 4
 COUNTS = 4095
@@ -102,3 +103,53 @@ def test_dropped_pictures_become_a_result(station: Station, opens: Opens, tmp_pa
     expect(page.locator(".slice canvas").first).to_have_attribute("data-painted", PAINTED)
     snapshot(page, "dropped-result")
     assert watched.complaints == []
+
+
+def frames_of(parent: Path, cols: int, seed: int) -> list[Path]:
+    """Pictures that a camera took, 72 rows each."""
+    draw = np.random.default_rng(seed)
+    parent.mkdir()
+    files = [parent / f"{number}.png" for number in range(FRAMES)]
+    for file in files:
+        cv2.imwrite(str(file), draw.integers(0, COUNTS, (72, cols)).astype(np.uint16))
+    return files
+
+
+def test_each_camera_has_its_own_pictures_and_none_are_lost(station: Station, opens: Opens, tmp_path: Path):
+    two_views(station, camera_px=96)
+    wide, *taken = (frames_of(tmp_path / f"{n}", 96 if n else 100, n) for n in range(5))
+    watched = opens(station.address)
+    page, library = watched.page, watched.page.locator(".library li")
+    go_to(page, "Capture")
+    page.get_by_text("Import pictures that another camera took").click()
+    section, camera = page.locator("details.import"), page.get_by_label("Camera that took them")
+    field = page.get_by_role("group", name="Reference: still air").locator("input")
+    field.set_input_files(taken[0])
+    camera.select_option(f"{VIEWS[1]}: wall x_max")
+    expect(section).to_contain_text(f"{VIEWS[0]}: 4, {VIEWS[1]}: 0.")
+    assert field.evaluate("field => field.files.length") == 0
+    # Those of another camera are refused by their size; all files stay where they were put.
+    field.set_input_files(wide)
+    page.get_by_role("button", name="Import 8 files").click()
+    expect(page.get_by_role("alert")).to_contain_text(f"100 x 72 px; the camera '{VIEWS[1]}'")
+    snapshot(page, "import-two-refused")
+    camera.select_option(f"{VIEWS[0]}: wall y_max")
+    expect(field).to_have_js_property("files.length", 4)
+    camera.select_option(f"{VIEWS[1]}: wall x_max")
+    field.set_input_files(taken[1])
+    page.get_by_role("button", name="Import 8 files").click()
+    expect(library.get_by_role("img")).to_have_count(1)
+    expect(library).to_have_count(1)
+    # One camera alone: the capture waits, and the other camera is next.
+    field = page.get_by_role("group", name="Flow: the air moving").locator("input")
+    camera.select_option(f"{VIEWS[0]}: wall y_max")
+    field.set_input_files(taken[2])
+    page.get_by_role("button", name="Import 4 files").click()
+    expect(page.locator(".library")).to_contain_text(f"There is no picture yet of {VIEWS[1]}")
+    expect(camera).to_have_value(VIEWS[1])
+    snapshot(page, "import-two-waiting")
+    field.set_input_files(taken[3])
+    page.get_by_role("button", name="Import 4 files").click()
+    expect(library.get_by_role("img")).to_have_count(2)
+    expect(library).to_have_count(2)
+    assert [one for one in watched.complaints if "422" not in one] == []
