@@ -9,6 +9,8 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from app.client import Client
+from app.experiment.folder import ExperimentSettings
+from core.scene import ProjectedPattern, Scene
 from tests.app.api.resources.test_own_rig import room_file
 from tests.app.setup.test_lights import ABOVE, ASIDE, LEFT, jet
 from tests.browser.conftest import Opens, Station, snapshot
@@ -203,17 +205,38 @@ def test_a_room_that_was_not_entered_on_the_page_is_edited_and_keeps_what_is_not
     expect(page.locator("main")).not_to_contain_text("Not asked here")
 
 
-def test_a_further_projector_is_entered_beside_its_camera_and_stays_when_the_room_is_edited(
-    station: Station, opens: Opens
-):
+def with_a_further_projector(station: Station, opens: Opens) -> tuple[Hand, Locator]:
+    """A room whose camera sees by two projectors, and the fields of the second one."""
     hand = chosen(station, opens)
     page = hand.page
     add = page.get_by_role("button", name="Add a projector before camera", exact=True)
     expect(add).to_have_count(0)
     hand.click(page.get_by_role("radio", name="A projector shows the pattern"))
     hand.click(add)
-    light = page.get_by_role("group", name="projector 2", exact=True)
-    # It begins where no other device stands, at the first one's height and distance.
+    return hand, page.get_by_role("group", name="projector 2", exact=True)
+
+
+def on_rig(station: Station, page: Page) -> ExperimentSettings:
+    """The settings of the one experiment, once the page has gone to Rig with it."""
+    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+    folders = station.app.state.services.folders
+    (found,) = folders.all()
+    return folders.open(found.name).settings
+
+
+def placed_m(scene: Scene, name: str) -> np.ndarray:
+    """Where the projector of a view stands, from the room's corner [m]."""
+    (view,) = [one for one in scene.views if one.name == name]
+    assert isinstance(view.light, ProjectedPattern)
+    return np.subtract(view.light.projector.position_m, scene.room.lower_m)
+
+
+def test_a_further_projector_begins_where_no_other_device_stands_and_a_wrong_place_is_told(
+    station: Station, opens: Opens
+):
+    hand, light = with_a_further_projector(station, opens)
+    page = hand.page
+    # At the first one's height and distance.
     wall = page.locator("section[aria-labelledby=wall-title]")
     first = [page.locator(f"input[name='projector.position[{axis}]']").input_value() for axis in range(3)]
     second = [page.locator(f"input[name='light[0].position[{axis}]']").input_value() for axis in range(3)]
@@ -222,11 +245,14 @@ def test_a_further_projector_is_entered_beside_its_camera_and_stays_when_the_roo
     expect(wall.get_by_role("group", name="projector 2")).not_to_contain_text("behind")
     light.get_by_role("button", name="Look for projector 2 at the serial ports").click()
     expect(light).to_contain_text(re.compile("has no serial port|Ask who is there"))
-    light.get_by_label("Its lens, x").fill("3")
     light.get_by_label("Its lens, y").fill("4")
     expect(light).to_contain_text("y is 4 m, at or behind the wall y_max")
     expect(page.locator("button.next")).to_have_text("1 to correct")
-    light.get_by_label("Its lens, y").fill("-1")
+
+
+def test_a_further_projector_goes_along_with_the_camera_that_it_stands_before(station: Station, opens: Opens):
+    hand, light = with_a_further_projector(station, opens)
+    page = hand.page
     # Before another camera's print it could not be alone; it goes along with a camera that has another name.
     hand.click(page.get_by_role("button", name="Add a camera"))
     light.get_by_label("Before the camera").select_option("camera 2")
@@ -242,20 +268,27 @@ def test_a_further_projector_is_entered_beside_its_camera_and_stays_when_the_roo
     expect(moved.get_by_label("Before the camera")).to_have_value("aside")
     moved.get_by_label("Before the camera").select_option("camera")
     hand.next_step("Create the experiment")
-    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
-    folders = station.app.state.services.folders
-    (found,) = folders.all()
-    scene = folders.open(found.name).settings.scene
-    views, corner_m = scene.views, scene.room.lower_m
+    views = on_rig(station, page).scene.views
     assert [(one.name, one.camera_of) for one in views] == [
         ("camera", None),
         ("aside", None),
         ("projector 2", "camera"),
     ]
-    placed_m = np.subtract(views[2].light.projector.position_m, corner_m)
-    np.testing.assert_allclose(placed_m, (3.0, -1.0, 1.3), atol=1e-9)
+
+
+def test_a_further_projector_stays_when_the_room_is_edited_until_it_is_removed(
+    station: Station, opens: Opens
+):
+    hand, light = with_a_further_projector(station, opens)
+    page = hand.page
+    light.get_by_label("Its lens, x").fill("3")
+    light.get_by_label("Its lens, y").fill("-1")
+    hand.next_step("Create the experiment")
+    made = on_rig(station, page)
+    np.testing.assert_allclose(placed_m(made.scene, "projector 2"), (3.0, -1.0, 1.3), atol=1e-9)
     # It is read from the scene alone, where nobody had entered it.
-    (folders.folder(found.name) / "answers.toml").unlink()
+    (folder,) = station.app.state.services.folders.all()
+    (folder / "answers.toml").unlink()
     page.get_by_role("button", name="Edit room").click()
     expect(page.locator("main")).not_to_contain_text("Not asked here")
     light.get_by_label("Its lens, z").fill("2.2")
@@ -263,16 +296,14 @@ def test_a_further_projector_is_entered_beside_its_camera_and_stays_when_the_roo
     expect(page.locator("button.next")).to_have_text("Change the room")
     snapshot(page, "lights-edited")
     hand.next_step("Change the room")
-    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
-    settings = folders.open(found.name).settings
-    placed_m = np.subtract(settings.scene.views[2].light.projector.position_m, corner_m)
-    np.testing.assert_allclose(placed_m, (3.0, -1.0, 2.2), atol=1e-9)
-    assert settings.rig.projectors["projector 2"].url == "pjlink://10.0.0.2"
+    changed = on_rig(station, page)
+    np.testing.assert_allclose(placed_m(changed.scene, "projector 2"), (3.0, -1.0, 2.2), atol=1e-9)
+    assert changed.rig.projectors is not None
+    assert changed.rig.projectors["projector 2"].url == "pjlink://10.0.0.2"
     page.get_by_role("button", name="Edit room").click()
     page.get_by_role("button", name="Remove projector 2").click()
     hand.next_step("Change the room")
-    expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
-    assert [one.name for one in folders.open(found.name).settings.scene.views] == ["camera", "aside"]
+    assert [one.name for one in on_rig(station, page).scene.views] == ["camera"]
 
 
 def test_a_mistake_is_told_at_its_field_while_it_is_typed_and_can_be_undone(station: Station, opens: Opens):
