@@ -1,8 +1,10 @@
-"""A real service on a free port, one for a module."""
+"""A real service on a free port, one for a module, and its client."""
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
 import httpx
 import pytest
@@ -11,6 +13,16 @@ from fastapi import FastAPI
 from app.api.factory import create_app
 from app.api.security.settings import ServiceConfig, new_token, service_config
 from app.api.server import listen, serving
+from app.client import Client
+
+
+class Running(Protocol):
+    """What the service tells of work that it does."""
+
+    state: Any
+
+
+R = TypeVar("R", bound=Running)
 
 
 @dataclass(frozen=True)
@@ -41,6 +53,21 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
     app = create_app(config)
     with serving(app, bound):
         yield Live(app, config, port, token)
+
+
+@pytest.fixture(scope="module")
+def airlens(live: Live) -> Iterator[Client]:
+    with Client(live.url, live.token, timeout_s=200) as client:
+        yield client
+
+
+def finished(ask: Callable[[], R], limit_s: float = 200.0) -> R:
+    """What `ask` answers once it runs no more."""
+    until_s = time.monotonic() + limit_s
+    while (found := ask()).state == "running":
+        assert time.monotonic() < until_s, found
+        time.sleep(0.02)
+    return found
 
 
 def is_problem(response: httpx.Response, code: str) -> bool:

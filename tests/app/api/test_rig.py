@@ -1,7 +1,6 @@
 """From nothing to two captures through the client, with the simulated rig and its faults."""
 
 import time
-from collections.abc import Iterator
 
 import cv2
 import numpy as np
@@ -10,13 +9,7 @@ import pytest
 from app.client import Client, ServiceError
 from app.rig.open import open_camera
 from drivers.simulated import CameraFault, SimulatedCamera
-from tests.app.api.conftest import Live
-
-
-@pytest.fixture(scope="module")
-def airlens(live: Live) -> Iterator[Client]:
-    with Client(live.url, live.token, timeout_s=200) as client:
-        yield client
+from tests.app.api.conftest import Live, finished
 
 
 @pytest.fixture(scope="module")
@@ -24,14 +17,6 @@ def experiment(airlens: Client) -> str:
     made = airlens.create_experiment("A room to practise", camera_px=96)
     airlens.connect_camera(made.experiment)
     return made.experiment
-
-
-def finish(airlens: Client, limit_s: float = 200.0) -> str:
-    until_s = time.monotonic() + limit_s
-    while airlens.running_capture().state == "running":
-        assert time.monotonic() < until_s
-        time.sleep(0.05)
-    return airlens.running_capture().state
 
 
 def test_an_experiment_that_is_still_being_made_is_not_listed(airlens: Client, experiment: str, live: Live):
@@ -77,7 +62,7 @@ def test_a_simulated_rig_is_calibrated_in_one_step(airlens: Client, experiment: 
 def test_a_reference_and_a_flow_are_taken_and_differ_by_the_air(airlens: Client, experiment: str):
     for role in ("reference", "flow"):
         assert airlens.start_capture(experiment, role, frames=4).state == "running"
-        assert finish(airlens) == "finished"
+        assert finished(airlens.running_capture).state == "finished"
     flow, reference = airlens.captures(experiment)
     assert (reference.role, reference.frames, reference.state) == ("reference", 4, "finished")
     images = [airlens.capture_image(experiment, one.capture) for one in (reference, flow)]
@@ -135,7 +120,7 @@ def test_a_camera_unplugged_during_a_burst_is_told_and_the_next_burst_works(
 
     services.camera.open(experiment, faulty, "still")
     airlens.start_capture(experiment, "reference", frames=60)
-    assert finish(airlens) in ("incomplete", "failed")
+    assert finished(airlens.running_capture).state in ("incomplete", "failed")
     told = airlens.running_capture().reason
     assert "device lost" in told
     assert "again" in told
@@ -143,7 +128,7 @@ def test_a_camera_unplugged_during_a_burst_is_told_and_the_next_burst_works(
     assert [one.state for one in listed].count("interrupted") == 1
     airlens.connect_camera(experiment)
     airlens.start_capture(experiment, "reference", frames=2)
-    assert finish(airlens) == "finished"
+    assert finished(airlens.running_capture).state == "finished"
     for one in listed:
         if one.state == "interrupted":
             airlens.discard_capture(experiment, one.capture)

@@ -1,6 +1,5 @@
 """Captures of two cameras through the service: one of them fails, and is taken again alone."""
 
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -13,7 +12,7 @@ from app.errors import BadInputError
 from app.experiment.captures import load_capture
 from app.experiment.folder import open_experiment, save_settings
 from app.rig.open import open_camera
-from tests.app.api.conftest import Live
+from tests.app.api.conftest import Live, finished
 
 
 @pytest.fixture(scope="module")
@@ -33,10 +32,7 @@ def experiment(live: Live, client: Client) -> str:
 
 
 def finish(client: Client) -> tuple[str, str]:
-    until_s = time.monotonic() + 200
-    while (now := client.running_capture()).state == "running":
-        assert time.monotonic() < until_s
-        time.sleep(0.02)
+    now = finished(client.running_capture)
     return now.state, now.reason
 
 

@@ -3,16 +3,8 @@
 import contextlib
 import itertools
 
-import pytest
-
 from app.client import Client
 from tests.app.api.conftest import Live
-
-
-@pytest.fixture
-def airlens(live: Live):
-    with Client(live.url, live.token, timeout_s=200) as client:
-        yield client
 
 
 def test_what_was_missed_is_replayed_from_the_last_event_id(live: Live, airlens: Client):

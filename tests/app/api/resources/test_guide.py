@@ -1,36 +1,19 @@
 """The guided calibration through the client: asked, taken, forgotten, skipped, stopped."""
 
-import time
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
 
-from app.api.models.guide import GuideResource, StepText
 from app.client import Client, ServiceError
 from app.experiment.folder import open_experiment, save_settings
 from core.scene import FixedTexture
 from core.view_frame import turn_to
-from tests.app.api.conftest import Live
-
-
-@pytest.fixture(scope="module")
-def airlens(live: Live) -> Iterator[Client]:
-    with Client(live.url, live.token, timeout_s=200) as client:
-        yield client
+from tests.app.api.conftest import Live, finished
 
 
 @pytest.fixture(scope="module")
 def experiment(airlens: Client) -> str:
     return airlens.create_experiment("A rig to calibrate", camera_px=256, light="projector").experiment
-
-
-def finished(airlens: Client, experiment: str, step: StepText = "camera") -> GuideResource:
-    until_s = time.monotonic() + 200
-    while (found := airlens.guide(experiment, step)).state == "running":
-        assert time.monotonic() < until_s
-        time.sleep(0.05)
-    return found
 
 
 def test_the_guide_asks_for_a_view_and_counts_it(airlens: Client, experiment: str):
@@ -40,7 +23,7 @@ def test_the_guide_asks_for_a_view_and_counts_it(airlens: Client, experiment: st
     assert (first.state, first.views, first.covered, first.complete) == ("idle", [], 0.0, False)
 
     assert airlens.take_guided(experiment).state == "running"
-    after = finished(airlens, experiment)
+    after = finished(lambda: airlens.guide(experiment))
 
     assert after.state == "idle"
     assert [view.name for view in after.views] == ["view_00.png"]
@@ -86,11 +69,11 @@ def test_a_step_that_cannot_begin_says_why(airlens: Client, experiment: str):
 
 def test_a_started_step_is_discarded(airlens: Client, experiment: str):
     airlens.take_guided(experiment)
-    assert finished(airlens, experiment).started
+    assert finished(lambda: airlens.guide(experiment)).started
     discarded = airlens.discard_guided(experiment)
     assert (discarded.started, discarded.views) == (False, [])
     airlens.take_guided(experiment)
-    assert len(finished(airlens, experiment).views) == 1
+    assert len(finished(lambda: airlens.guide(experiment)).views) == 1
 
 
 def test_each_camera_is_guided_by_its_name(airlens: Client, live: Live):
@@ -107,10 +90,7 @@ def test_each_camera_is_guided_by_its_name(airlens: Client, live: Live):
         airlens.take_guided(made, view="left")
 
     assert airlens.take_guided(made, view="side").view == "side"
-    until_s = time.monotonic() + 200
-    while (after := airlens.guide(made, view="side")).state == "running":
-        assert time.monotonic() < until_s
-        time.sleep(0.05)
+    after = finished(lambda: airlens.guide(made, view="side"))
     assert [view.name for view in after.views] == ["view_00.png"]
     assert airlens.camera(view=1).name == "simulated side"
     other = airlens.guide(made, view="camera")

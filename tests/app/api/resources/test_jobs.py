@@ -13,14 +13,14 @@ STUDY = {"trials": 40, "size_px": 64}
 
 
 @pytest.fixture(scope="module")
-def airlens(live: Live) -> Iterator[Client]:
+def airlens(airlens: Client, live: Live) -> Iterator[Client]:
+    """With a supervisor beside the service."""
     stop = threading.Event()
     ledger = live.app.state.services.ledger
     supervisor = Supervisor(ledger, read_config(live.config.jobs_folder))
     thread = threading.Thread(target=supervisor.run, args=(stop,))
     thread.start()
-    with Client(live.url, live.token, timeout_s=200) as client:
-        yield client
+    yield airlens
     stop.set()
     thread.join()
 

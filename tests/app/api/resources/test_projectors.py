@@ -1,6 +1,5 @@
 """Several projectors over the service: each has its own line and state, and they take turns before one camera."""
 
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from app.experiment.rig_settings import BoardSettings, ProjectorSettings, V4l2Ca
 from core.scene import ProjectedPattern
 from drivers.projector.protocol import PowerState
 from drivers.simulated import SimulatedCamera
-from tests.app.api.conftest import Live
+from tests.app.api.conftest import Live, finished
 
 SECOND = "light 2"
 TWIN = "simulated:pjlink?warm_up_s=0&cool_down_s=0"
@@ -143,10 +142,7 @@ def test_all_are_dark_but_the_one_that_is_calibrated_by(client: Client, live: Li
     live.app.state.services.desk.wait(60)
     client.change_projector(muted=True, view=0)
     client.take_guided(wall, "camera", view="camera", settle_s=0)
-    deadline_s = time.monotonic() + 60
-    while (now := client.guide(wall, "camera", "camera")).busy:
-        assert time.monotonic() < deadline_s, now
-        time.sleep(0.05)
+    now = finished(lambda: client.guide(wall, "camera", "camera"))
     assert now.state == "idle", now.reason
     assert muted(client) == [False, True]
 

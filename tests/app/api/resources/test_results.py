@@ -4,7 +4,6 @@ import dataclasses
 import json
 import shutil
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
@@ -26,12 +25,6 @@ from tests.app.api.conftest import Live
 AXES = [np.linspace(0.0, size, n) for size, n in ((4.0, 5), (3.0, 6), (2.0, 7))]
 T = (293.0 + np.random.default_rng(0).normal(0, 2, (5, 6, 7))).astype(np.float32)
 U = np.random.default_rng(1).normal(0, 0.2, (5, 6, 7, 3)).astype(np.float32)
-
-
-@pytest.fixture(scope="module")
-def airlens(live: Live) -> Iterator[Client]:
-    with Client(live.url, live.token, timeout_s=200) as client:
-        yield client
 
 
 @pytest.fixture(scope="module")

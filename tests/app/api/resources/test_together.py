@@ -1,13 +1,10 @@
 """A board before two cameras at once, through the client: asked, taken, found on each, forgotten, adjusted."""
 
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from app.api.models.together import PlacesResource
 from app.calibrate.folder import CalibrationFolder
 from app.calibrate.together_live import TogetherPlan, TogetherSession
 from app.client import Client, ServiceError
@@ -17,29 +14,15 @@ from app.rig.open import open_stage
 from app.rig.stage import RealStage
 from drivers.simulated import SimulatedCamera
 from drivers.simulated.faults import CameraFault
-from tests.app.api.conftest import Live
+from tests.app.api.conftest import Live, finished
 from tests.app.calibrate.test_together import experiment, smaller
 from tests.calibration.test_together import rig
-
-
-@pytest.fixture(scope="module")
-def airlens(live: Live) -> Iterator[Client]:
-    with Client(live.url, live.token, timeout_s=200) as client:
-        yield client
 
 
 @pytest.fixture(scope="module")
 def made(live: Live) -> str:
     folder = live.app.state.services.folders.root / "two"
     return experiment(folder, smaller(rig(11))).name
-
-
-def finished(airlens: Client, made: str, places: int) -> PlacesResource:
-    until_s = time.monotonic() + 200
-    while (found := airlens.places_together(made, places)).state == "running":
-        assert time.monotonic() < until_s
-        time.sleep(0.05)
-    return found
 
 
 def test_places_are_taken_by_both_cameras_and_what_each_found_is_told(airlens: Client, made: str):
@@ -50,7 +33,7 @@ def test_places_are_taken_by_both_cameras_and_what_each_found_is_told(airlens: C
     assert (first.state, first.places, first.pairs, first.enough) == ("idle", [], [], False)
 
     assert airlens.take_place(made, places=3).state == "running"
-    after = finished(airlens, made, 3)
+    after = finished(lambda: airlens.places_together(made, 3))
     assert (after.state, after.reason) == ("idle", "")
     (place,) = after.places
     assert {one.view: one.points for one in place.seen} == {"a": 30, "b": 30}
@@ -69,7 +52,7 @@ def test_a_place_is_forgotten_and_taken_again_until_there_are_enough(airlens: Cl
         airlens.retake_place(made, place.place)
     for _ in range(2):
         airlens.take_place(made, places=3)
-        assert finished(airlens, made, 3).issues == []
+        assert finished(lambda: airlens.places_together(made, 3)).issues == []
     assert airlens.skip_place(made, places=3).enough
     assert airlens.places_together(made, 4).wanted is not None
 
