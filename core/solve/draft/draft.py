@@ -6,12 +6,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy import sparse
 
-from core.data_error import WALL_MARGIN
 from core.known_temperature import VertexGrid
 from core.problem import Problem
 from core.rays.matrix import as_matrix
 from core.rays.operator import build
-from core.rays.visibility import away_from_walls
 from core.result import Solution
 from core.scene import Scene
 from core.solve.check import check_problem
@@ -83,7 +81,6 @@ def solve_draft(
     StoppedError.
     """
     check_problem(problem, "bos+boundary")
-    problem = _past_layers(problem)
     grid = draft_grid(problem.scene)
     operators = tuple(
         rays(view, shift.centres_px)
@@ -92,18 +89,3 @@ def solve_draft(
         for view, shift in enumerate(problem.shifts)
     )
     return solve_temperature(problem, operators, grid, settings, watch)
-
-
-def _past_layers(problem: Problem) -> Problem:
-    """The problem without windows beside walls, where views look along several axes.
-
-    A wall's thermal layer is thinner than a cell. A view along the wall sees it in those windows, and where another
-    view looks at the wall nothing else can take it up: it would be spread over the room.
-    """
-    if len(looked_along(problem.scene)) < 2:
-        return problem
-    shifts = tuple(
-        shift.at(away_from_walls(problem.scene, view, shift.centres_px, WALL_MARGIN))
-        for view, shift in enumerate(problem.shifts)
-    )
-    return Problem(problem.scene, shifts, problem.planes, problem.sensors, problem.images)
