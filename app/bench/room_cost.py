@@ -121,12 +121,13 @@ def _derivatives(
     where: Room, prior: Prior, base: ForwardRun, settings: RoomSettings, run_s: float
 ) -> dict[str, float]:
     """Cost of the prior's derivatives scaled to six, over one run, and the gain of a second thread."""
-    vector = np.zeros(len(prior.active()))
+    vector, spread = np.zeros(len(prior.active())), np.ones(len(prior.active()))
     share = 7.0 / (len(vector) + 1)
     found = {}
     for threads in (1, 2):
         wall_s, cpu_s = time.perf_counter(), time.process_time()
-        perturbed(where, prior, vector, base, replace(settings, threads=threads), _VERTICES, Marches())
+        each = replace(settings, threads=threads)
+        perturbed(where, prior, vector, spread, base, each, _VERTICES, Marches())
         found[threads] = (time.perf_counter() - wall_s, time.process_time() - cpu_s)
     return {
         "six_derivatives_over_run": share * found[1][1] / run_s,

@@ -9,7 +9,7 @@ from jaxtyping import ArrayLike, Float
 
 from core.estimate.marches import Marches, work
 from core.estimate.plane_openings import air_planes, still_vertices
-from core.estimate.prior import WALL_PARAMETERS, Prior
+from core.estimate.prior import Prior
 from core.known import leaving_excess_k
 from core.problem import Problem
 from core.result import Outcome, Solution
@@ -21,14 +21,6 @@ from core.room.vertices import RoomFields
 from core.room.wall_planes import set_normal
 from core.scene import Inlet
 from core.setting import check_range, setting
-
-# Steps of the finite differences, in prior standard deviations. A march is not quite steady: the step must change the
-# shifts by more than that unsteadiness does, and by less than the response's curvature. With half a deviation the
-# fit of a wrongly stated supply does not converge.
-# Unknown walls: a jet turns another way when a wall changes much. On room A the change of the shifts over two
-# deviations has a cosine of 0.34 to 0.66 with that over 0.25, and the change over half a deviation 0.77 to 0.94.
-# A suspected heater: one deviation, which is half of the heat that the marches found there.
-_DIFFERENCE, _WALLS_DIFFERENCE, _SUSPECTED_DIFFERENCE = 2.0, 0.3, 1.0
 
 # Most time steps of a march, for each cell along the room's edge and each second. The reference room takes a quarter
 # of them; the limit stops a march whose air is far faster than what was stated.
@@ -67,7 +59,7 @@ class RoomSettings:
     renewals: int = 2
     fine_step: float = 0.3
     settle_s: float = 240.0
-    restart_s: float = 90.0
+    restart_s: float = 180.0
     refine_s: float = 90.0
     use_images: bool = True
     log_viscosity_std: float | None = None
@@ -184,32 +176,31 @@ def perturbed(
     where: Room,
     prior: Prior,
     vector: Float[np.ndarray, " active"],
+    spread: Float[np.ndarray, " active"],
     base: ForwardRun,
     settings: RoomSettings,
     vertices: tuple[int, int, int],
     marches: Marches,
-) -> Derivatives:
-    """Restarts of the run `base`: one unchanged, then one for each parameter moved by its step."""
-    sizes = differences(prior)
+) -> tuple[Derivatives, ForwardRun]:
+    """Restarts of the run `base` under the parameters `vector`: one for each that is moved, and one as they are.
+
+    Each parameter is moved by as far as it is uncertain, `spread` (in prior deviations): a derivative must hold over
+    that range, and a room's response is no straight line. What is not yet steady is so in all of them alike. Returns
+    the derivatives and the run that none was moved in, where the next restarts begin.
+    """
     flow, seconds = base.flow.last, settings.restart_s
 
-    def one(step: Float[np.ndarray, " active"]) -> RoomFields:
-        return march_under(where, prior.parameters(vector + step), flow, seconds, vertices, marches).fields
+    def one(step: Float[np.ndarray, " active"]) -> ForwardRun:
+        return march_under(where, prior.parameters(vector + step), flow, seconds, vertices, marches)
 
-    found: list[RoomFields] = []
+    found: list[ForwardRun] = []
     with ThreadPoolExecutor(settings.threads) as pool:
-        for run in pool.map(one, [np.zeros(len(sizes)), *np.diag(sizes)]):
+        for run in pool.map(one, [np.zeros(len(spread)), *np.diag(spread)]):
             found.append(run)
             doing = "move one parameter after the other"
-            marches.record({"doing": doing, "moved": len(found) - 1.0, "of": float(len(sizes))})
-    return Derivatives(found[0], found[1:], np.diag(sizes))
-
-
-def differences(prior: Prior) -> Float[np.ndarray, " active"]:
-    """The finite-difference step of each parameter, in prior deviations."""
-    walls = [bool(prior.unknown_walls()) and name.startswith(WALL_PARAMETERS) for name in prior.names()]
-    sizes = np.where(walls, _WALLS_DIFFERENCE, _DIFFERENCE)
-    return np.where(prior.suspected(), _SUSPECTED_DIFFERENCE, sizes)
+            marches.record({"doing": doing, "moved": len(found) - 1.0, "of": float(len(spread))})
+    unmoved, others = found[0], [run.fields for run in found[1:]]
+    return Derivatives(unmoved.fields, others, np.diag(spread)), unmoved
 
 
 def other_closure(where: Room) -> str:

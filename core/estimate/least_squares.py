@@ -26,6 +26,11 @@ class Posterior(eqx.Module):
     covariance: Float[np.ndarray, "active active"]
     deviation: Float[np.ndarray, " data"]
 
+    @property
+    def spread(self) -> Float[np.ndarray, " active"]:
+        """Each parameter's deviation."""
+        return np.sqrt(np.diag(self.covariance))
+
 
 def gauss_newton(
     vector: Float[np.ndarray, " active"],

@@ -29,14 +29,15 @@ def fine_search(
     data: Observations,
     first: ForwardRun,
     derivatives: Derivatives,
-    renewed: Callable[[Vector], Derivatives],
+    renewed: Callable[[Vector, Vector], Derivatives],
     settings: RoomSettings,
     marches: Marches,
 ) -> tuple[Fit, Derivatives]:
     """The parameters and forward run of least misfit, and the last derivatives.
 
-    The derivatives are computed anew by `renewed`, at most `settings.renewals` times: on every other round if the
-    parameters have moved far, and when the rounds no longer gain.
+    The derivatives are computed anew by `renewed`, over the parameters' posterior deviations, at most
+    `settings.renewals` times: on every other round if the parameters have moved far, and when the rounds no longer
+    gain.
     """
     linearised = np.zeros(len(prior.active()))
     best = Fit(Posterior(linearised, np.eye(len(linearised)), np.zeros(0)), first)
@@ -58,7 +59,7 @@ def fine_search(
         away = farthest(best.posterior.vector, linearised)
         if renewals > 0 and (done or n % 2 == 1) and away > enough:
             renewals, linearised, stale, trust_radius = renewals - 1, best.posterior.vector, 0, LONGEST_STEP
-            derivatives = renewed(linearised)
+            derivatives = renewed(linearised, best.posterior.spread)
             jacobian = derivatives.per_deviation(data.predicted).T
         elif done:
             break

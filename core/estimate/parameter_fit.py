@@ -54,15 +54,14 @@ def coarse_fit(
         background.derivatives,
     )
     vector = linearised = np.zeros(len(prior.active()))
+    spread = np.ones(len(vector))
     finer = data.predicted(background.first.fields) - data.predicted(base.fields)
     moves = settings.use_images and not prior.unknown_walls()
     if moves:
         vector, base = heaters_by_march(coarse, prior, data, base, finer, settings, marches)
     if np.any(vector):
-        derivatives, linearised = (
-            perturbed(coarse, prior, vector, base, settings, data.vertices, marches),
-            vector,
-        )
+        derivatives, base = perturbed(coarse, prior, vector, spread, base, settings, data.vertices, marches)
+        linearised = vector
     for n in range(settings.coarse_rounds if moves else 0):
         # The grids' difference changes as the parameters move: half of it counts as representation error.
         jacobian = derivatives.per_deviation(data.predicted).T
@@ -87,12 +86,12 @@ def coarse_fit(
             break
         vector, base = new, tried
         if farthest(vector, linearised) > settings.jacobian_valid:
-            derivatives, linearised = (
-                perturbed(coarse, prior, vector, base, settings, data.vertices, marches),
-                vector,
+            derivatives, base = perturbed(
+                coarse, prior, vector, spread, base, settings, data.vertices, marches
             )
+            linearised = vector
     if np.any(vector != linearised):
-        derivatives = perturbed(coarse, prior, vector, base, settings, data.vertices, marches)
+        derivatives, base = perturbed(coarse, prior, vector, spread, base, settings, data.vertices, marches)
     return vector, base, derivatives
 
 

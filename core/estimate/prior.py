@@ -45,8 +45,6 @@ _CLOSURE_STD, _SIMPLE_CLOSURE_STD = 0.12, 0.25
 _GUESSED_VISCOSITY_STD = 1.5
 # Least deviations of a supply: of its temperature, as a share of the contrast, and of its flow.
 _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
-# Parameters of the walls, by the beginnings of their names.
-WALL_PARAMETERS = ("wall_excess_k", "log_heat")
 
 
 class Prior(eqx.Module):
@@ -134,7 +132,8 @@ class Prior(eqx.Module):
         suspected = self.suspected()
         if suspected.any():
             return ~suspected
-        own = ("log_closure", "log_viscosity", *(WALL_PARAMETERS if self.unknown_walls() else ()))
+        walls = ("wall_excess_k", "log_heat") if self.unknown_walls() else ()
+        own = ("log_closure", "log_viscosity", *walls)
         return np.array([name.startswith(own) for name in self.names()], bool)
 
 

@@ -74,9 +74,8 @@ def background_of(
     flow = carried_over(base.flow.last, coarse.grid, fine.grid)
     doing = "march the fine room as stated"
     first = march_under(fine, prior.mean, flow, settings.refine_s, vertices, marches, doing=doing)
-    derivatives = perturbed(coarse, prior, np.zeros(len(prior.active())), base, settings, vertices, marches)
-    # The unchanged restart has marched as long as the moved ones: it is what they are compared with.
-    base = ForwardRun(base.parameters, base.flow, derivatives.start)
+    start, spread = np.zeros(len(prior.active())), np.ones(len(prior.active()))
+    derivatives, base = perturbed(coarse, prior, start, spread, base, settings, vertices, marches)
     return Background(problem, coarse, fine, prior, base, first, derivatives)
 
 
@@ -133,8 +132,10 @@ def fitted_room(
         where, flow, doing = prior.parameters(vector), first.flow.last, "march the fine room as corrected"
         first = march_under(fine, where, flow, settings.refine_s, vertices, marches, doing=doing)
 
-    def renewed(where: Vector) -> Derivatives:
-        return perturbed(coarse, prior, where, base, settings, vertices, marches)
+    def renewed(where: Vector, spread: Vector) -> Derivatives:
+        nonlocal base
+        found, base = perturbed(coarse, prior, where, spread, base, settings, vertices, marches)
+        return found
 
     derivatives = linearised
     if settings.use_images and prior.unknown_walls():
