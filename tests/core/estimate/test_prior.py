@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.estimate.diagnostics import undetermined
-from core.estimate.forward_runs import Derivatives, differences
+from core.estimate.forward_runs import Derivatives
 from core.geometry import WALLS
 from core.problem import Problem
 from core.room.vertices import RoomFields
@@ -51,17 +51,12 @@ def test_where_one_of_them_is_stated_the_other_is_fitted_alone(known: str):
     assert "as one" not in undetermined(given)[0]
 
 
-def test_unknown_walls_are_not_let_go_and_moved_a_little_only():
+def test_unknown_walls_are_not_let_go():
     unknown, stated = prior_of(problem(stated=False)), prior_of(with_walls(**dict.fromkeys(WALLS, 293.15)))
 
     gaussian = dict(zip(unknown.names(), unknown.gaussian(), strict=True))
-    steps, usual = (dict(zip(p.names(), differences(p), strict=True)) for p in (unknown, stated))
 
     assert {n for n, f in gaussian.items() if not f} == {"inlet_excess_k[0]", "inlet_log_flow[0]"}
-    # Jets turn another way when a wall changes much: its step is smaller than that of a stated wall's coefficient.
-    assert {n for n, s in steps.items() if s < usual["log_heat"]} == {
-        n for n in gaussian if n.startswith(("wall", "log_heat"))
-    }
     # A stated wall's heat coefficient may have been entered wrongly.
     assert not dict(zip(stated.names(), stated.gaussian(), strict=True))["log_heat"]
 

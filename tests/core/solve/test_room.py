@@ -9,7 +9,7 @@ import pytest
 from jax.flatten_util import ravel_pytree
 
 from core.estimate.alternatives import promising_closure
-from core.estimate.forward_runs import Derivatives, march_under
+from core.estimate.forward_runs import Derivatives, march_under, perturbed
 from core.estimate.heaters import heaters_by_march
 from core.estimate.levenberg_marquardt import fine_search
 from core.estimate.marches import Marches
@@ -183,9 +183,11 @@ def test_derivatives_are_made_again_where_unknown_walls_have_moved(unknown_walls
     data = observations(background.problem, (settings.vertices,) * 3)
     moved_to: list[np.ndarray] = []
     reported: list[dict] = []
+    over: list[np.ndarray] = []
 
-    def renewed(vector: np.ndarray) -> Derivatives:
+    def renewed(vector: np.ndarray, spread: np.ndarray) -> Derivatives:
         moved_to.append(vector)
+        over.append(spread)
         return background.derivatives
 
     # A coarse room's own errors would move walls that nobody knows.
@@ -206,6 +208,8 @@ def test_derivatives_are_made_again_where_unknown_walls_have_moved(unknown_walls
     # After the second round, from the room that was nearest to the data by then.
     kept = [event for event in rounds[:2] if event["misfit_left"] < 1.0][-1]
     np.testing.assert_allclose(moved_to[0], deviations(background.prior, kept), atol=1e-6)
+    # The data have told every parameter more than the prior did.
+    assert np.all((over[0] > 0.0) & (over[0] < 1.0))
 
 
 def test_a_search_whose_derivatives_mislead_comes_back_and_learns(unknown_walls: Background):
@@ -314,6 +318,25 @@ def test_what_a_stated_heater_gives_off_is_found_by_marches(deviations: float):
     assert found[own] == pytest.approx(deviations, abs=0.75)
     assert not np.delete(found, own).any()
     assert (misfit_ratio(data, better, background.base) < 1.0) == bool(found[own])
+
+
+def test_a_parameter_is_moved_by_as_far_as_it_is_uncertain(truth: Solution):
+    background = background_of(measured(scene(SUPPLY), truth, 1e-5), SHORT, Marches())
+    prior, first = background.prior, background.derivatives
+    start, vertices = np.zeros(len(prior.active())), (SHORT.vertices,) * 3
+    spread = np.linspace(0.2, 0.6, len(start))
+
+    found, unmoved = perturbed(
+        background.coarse, prior, start, spread, background.base, SHORT, vertices, Marches()
+    )
+
+    np.testing.assert_array_equal(first.apart, np.eye(len(start)))
+    np.testing.assert_array_equal(found.apart, np.diag(spread))
+    # The restarts begin where the room that was given ended: what is steady stays as it is.
+    np.testing.assert_allclose(unmoved.fields.excess_k, background.base.fields.excess_k, atol=0.5)
+    own = prior.names().index("inlet_excess_k[0]")
+    warmer = [float(d.per_deviation(lambda f: f.excess_k.mean())[own]) for d in (first, found)]
+    assert warmer[1] == pytest.approx(warmer[0], rel=0.2)
 
 
 def test_a_level_that_thermometers_moved_is_doubted_by_half_of_that(truth: Solution):
