@@ -40,6 +40,7 @@ class RoomSettings:
     `coarse_step`, `least_gain`: rounds on the coarse grid end when no parameter moves by more than `coarse_step`,
     or when a round leaves more than `least_gain` of the misfit.
     `jacobian_valid`: a Jacobian is computed anew once a parameter has moved this far from where it was computed.
+    `restart_walls_s`: as `restart_s`, where walls are unknown: a jet takes long to answer to them.
     `jacobian_valid_walls`, `renewals`: the same for the fine room where walls are unknown, and how often at most.
     `fine_step`: rounds on the fine grid end when no parameter moves by more.
     `wall_heat`: multiplies the walls' heat coefficient from the heat balance, or the nominal one.
@@ -59,12 +60,17 @@ class RoomSettings:
     renewals: int = 2
     fine_step: float = 0.3
     settle_s: float = 240.0
-    restart_s: float = 180.0
+    restart_s: float = 90.0
+    restart_walls_s: float = 180.0
     refine_s: float = 90.0
     use_images: bool = True
     log_viscosity_std: float | None = None
     wall_heat: float = 1.0
     threads: int = 2
+
+    def restarts_s(self, prior: Prior) -> float:
+        """How long a coarse room marches on under other parameters."""
+        return self.restart_walls_s if prior.unknown_walls() else self.restart_s
 
     def __post_init__(self) -> None:
         check_range("wall_heat", self.wall_heat, 0.01, 100.0, "", "1 takes what the heat balance gives.")
@@ -188,7 +194,7 @@ def perturbed(
     that range, and a room's response is no straight line. What is not yet steady is so in all of them alike. Returns
     the derivatives and the run that none was moved in, where the next restarts begin.
     """
-    flow, seconds = base.flow.last, settings.restart_s
+    flow, seconds = base.flow.last, settings.restarts_s(prior)
 
     def one(step: Float[np.ndarray, " active"]) -> ForwardRun:
         return march_under(where, prior.parameters(vector + step), flow, seconds, vertices, marches)
@@ -210,7 +216,8 @@ def other_closure(where: Room) -> str:
 
 def run_under_other_closure(
     where: Room,
-    parameters: RoomParameters,
+    prior: Prior,
+    vector: Float[np.ndarray, " active"],
     base: ForwardRun,
     settings: RoomSettings,
     vertices: tuple[int, int, int],
@@ -221,4 +228,5 @@ def run_under_other_closure(
     flow = Flow(last.velocity, last.excess_k, last.pressure_m2_s2, None)
     another = room(where.scene, settings.coarse_cells, other_closure(where))
     doing = f"march the coarse room by the closure {another.closure}"
-    return march_under(another, parameters, flow, settings.restart_s, vertices, marches, doing=doing).fields
+    parameters, seconds = prior.parameters(vector), settings.restarts_s(prior)
+    return march_under(another, parameters, flow, seconds, vertices, marches, doing=doing).fields

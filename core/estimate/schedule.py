@@ -17,12 +17,13 @@ def fit_work(coarse: Room, fine: Room, prior: Prior, settings: RoomSettings) -> 
 
 def marched_s(prior: Prior, settings: RoomSettings) -> tuple[float, float]:
     """Model seconds of the coarse and of the fine room."""
-    restarts = (1 + len(prior.active())) * settings.restart_s
+    restart_s = settings.restarts_s(prior)
+    restarts = (1 + len(prior.active())) * restart_s
     # Walls that nobody has stated move far: derivatives are made again, and corrections go on.
     far = bool(prior.unknown_walls())
     rounds = min(settings.rounds, _UNKNOWN_ROUNDS if far else _STATED_ROUNDS)
     # One coarse correction that is tried, and the second closure's run, beside the Jacobian's.
-    coarse_s = settings.settle_s + (1 + settings.renewals * far) * restarts + 2 * settings.restart_s
+    coarse_s = settings.settle_s + (1 + settings.renewals * far) * restarts + 2 * restart_s
     # The room as stated, and each round.
     fine_s = (1 + rounds) * settings.refine_s
     return coarse_s, fine_s

@@ -116,9 +116,10 @@ def _warmed(
     images = group == IMAGES
     before = data.predicted(background.base.fields)
     best, best_k, flow = 0.0, 0.0, background.base.flow.last
+    seconds = settings.restarts_s(background.prior)
     for heat_k in _LADDER_K:
         warm = eqx.tree_at(lambda p: p.heater_excess_k, mean, mean.heater_excess_k.at[heater].add(heat_k))
-        tried = march_under(coarse, warm, flow, settings.restart_s, data.vertices, marches)
+        tried = march_under(coarse, warm, flow, seconds, data.vertices, marches)
         change = data.predicted(tried.fields) - before
         left, change = (unshared(data, of[images]) for of in (values - before, change))
         likeness, scale = matched(left, change, variance[images])

@@ -126,7 +126,7 @@ def fitted_room(
     vertices = (settings.vertices, settings.vertices, settings.vertices)
     data = with_noise_seen(data_of(background, problem, settings), background.first.fields)
     vector, base, linearised = coarse_fit(background, data, settings, marches)
-    other = run_under_other_closure(coarse, prior.parameters(vector), base, settings, vertices, marches)
+    other = run_under_other_closure(coarse, prior, vector, base, settings, vertices, marches)
     first = background.first
     if np.any(vector):
         where, flow, doing = prior.parameters(vector), first.flow.last, "march the fine room as corrected"

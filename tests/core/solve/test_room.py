@@ -40,9 +40,11 @@ SUPPLY = Inlet(
     temperature_k=303.15,
     velocity_m_s=(0.4, 0.0, 0.0),
 )
-SETTINGS = RoomSettings(cells=10, coarse_cells=8, vertices=12, settle_s=300.0, restart_s=90.0, refine_s=90.0)
+SETTINGS = RoomSettings(
+    cells=10, coarse_cells=8, vertices=12, settle_s=300.0, restart_s=90.0, restart_walls_s=90.0, refine_s=90.0
+)
 # Where it does not matter how far the air has settled.
-SHORT = replace(SETTINGS, settle_s=60.0, restart_s=30.0, refine_s=30.0, rounds=2)
+SHORT = replace(SETTINGS, settle_s=60.0, restart_s=30.0, restart_walls_s=30.0, refine_s=30.0, rounds=2)
 
 
 def telling(told: list[dict]) -> Marches:

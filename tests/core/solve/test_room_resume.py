@@ -14,7 +14,14 @@ from core.watch import StoppedError, Watch
 from tests.core.solve.test_room import SUPPLY, measured, scene
 
 SETTINGS = RoomSettings(
-    cells=8, coarse_cells=6, vertices=9, settle_s=60.0, restart_s=30.0, refine_s=30.0, rounds=2
+    cells=8,
+    coarse_cells=6,
+    vertices=9,
+    settle_s=60.0,
+    restart_s=30.0,
+    restart_walls_s=30.0,
+    refine_s=30.0,
+    rounds=2,
 )
 
 
