@@ -31,7 +31,7 @@ class Solve(Protocol):
 AUTO = "auto"
 STANDARD = RoomSettings()
 # Where walls are unknown the search may still gain after the eight rounds of `standard`; it ends where it does not.
-REFERENCE = RoomSettings(cells=64, coarse_cells=40, rounds=16, renewals=4)
+REFERENCE = RoomSettings(cells=64, coarse_cells=40, restart_s=120.0, rounds=16, renewals=4)
 
 
 def draft(problem: Problem, watch: Watch = Watch()) -> Solution:
