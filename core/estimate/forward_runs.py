@@ -40,7 +40,7 @@ class RoomSettings:
     `coarse_step`, `least_gain`: rounds on the coarse grid end when no parameter moves by more than `coarse_step`,
     or when a round leaves more than `least_gain` of the misfit.
     `jacobian_valid`: a Jacobian is computed anew once a parameter has moved this far from where it was computed.
-    `restart_walls_s`: as `restart_s`, where walls are unknown: a jet takes long to answer to them.
+    `restart_walls_s`: as `restart_s`, where walls are unknown: jets answer slowly to a wall.
     `jacobian_valid_walls`, `renewals`: the same for the fine room where walls are unknown, and how often at most.
     `fine_step`: rounds on the fine grid end when no parameter moves by more.
     `wall_heat`: multiplies the walls' heat coefficient from the heat balance, or the nominal one.
