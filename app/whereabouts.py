@@ -10,6 +10,7 @@ from pathlib import Path
 
 from app.calibrate.parts import Part, parts_of, ties_of
 from app.errors import BadInputError
+from app.experiment.capture_parts import parts_of as capture_parts
 from app.experiment.folder import (
     Experiment,
     finished,
@@ -20,7 +21,7 @@ from app.experiment.folder import (
 from app.experiment.plan import PLAN_FILE
 from app.experiment.printed import is_of_the_scene, read_printed
 from app.experiment.rig_settings import RealCameraSettings
-from app.experiment.views import printed_walls
+from app.experiment.views import printed_walls, view_names
 from core.scene import FixedTexture
 
 
@@ -181,11 +182,30 @@ def _of_the_captures(experiment: Experiment, shown: str) -> Next | None:
     reasons = {"reference": "with still air", "flow": "with the air moving"}
     for role, reason in reasons.items():
         if not roles[role]:
+            lacking = _lacking(experiment, role)
+            if lacking is not None:
+                folder, view = lacking
+                return Next(
+                    Step(role),
+                    f"airlens capture retake {shown} --view {shlex.quote(view)} --capture {folder.name}",
+                    f"the {role} lacks the picture of {view}; those of the other cameras are kept",
+                )
             return Next(
                 Step(role),
                 f"airlens capture {role} {shown} --frames {frames}",
                 f"the {role} is missing: take it {reason}",
             )
+    return None
+
+
+def _lacking(experiment: Experiment, role: str) -> tuple[Path, str] | None:
+    """The newest capture of a role that some cameras took and not all, and the first view that it lacks."""
+    for folder in reversed(_visible(interrupted(experiment.captures_folder))):
+        with contextlib.suppress(BadInputError):
+            parts = capture_parts(folder, view_names(experiment))
+            taken = parts.views and parts.origin.get("rig") != "imported"
+            if taken and parts.role == role and parts.missing:
+                return folder, parts.missing[0]
     return None
 
 
@@ -217,7 +237,8 @@ def _rig(experiment: Experiment) -> str:
     rig, scene = experiment.settings.rig, experiment.settings.scene
     camera = "no camera named" if rig.camera is None else f"{rig.camera_kind} camera"
     if isinstance(rig.camera, RealCameraSettings):
-        camera = f"camera {rig.camera.device}"
+        named = [rig.camera, *(rig.cameras or {}).values()]
+        camera = ("camera " if len(named) == 1 else "cameras ") + ", ".join(one.device for one in named)
     light = "a printed pattern" if isinstance(scene.light, FixedTexture) else "a projector"
     return f"{camera} before {light}; a room of {' x '.join(f'{size:g}' for size in scene.room.size_m)} m"
 
@@ -257,8 +278,12 @@ def _results(experiment: Experiment) -> str:
 
 
 def _left(parent: Path) -> str:
-    left = [folder for folder in interrupted(parent) if not folder.name.startswith(".")]
+    left = _visible(interrupted(parent))
     return f", {len(left)} interrupted" if left else ""
+
+
+def _visible(folders: list[Path]) -> list[Path]:
+    return [folder for folder in folders if not folder.name.startswith(".")]
 
 
 def each(folders: list[Path], shown: Callable[[Path], str] = str) -> list[tuple[Path, str, str]]:

@@ -52,6 +52,13 @@ class BurstOutcome(StrEnum):
     DEVICE_LOST = "device lost"
     TOO_MANY_REFUSED = "too many refused"
 
+    @property
+    def advice(self) -> str:
+        """What to do before it is taken again; empty where the burst's verdicts say it."""
+        if self is BurstOutcome.DEVICE_LOST:
+            return "Plug the camera in; `airlens devices` lists what is there."
+        return ""
+
 
 @dataclass(frozen=True)
 class FrameRecord:

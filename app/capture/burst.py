@@ -62,34 +62,40 @@ class Order:
 class TakenBurst:
     """A burst and where it is; no folder when it was discarded.
 
-    Of several views `burst` stands for all, and `failed` says by a view's name why it has no picture.
+    Of several views `burst` stands for all, `failed` says by a view's name why it has no picture, and `any_whole`
+    whether another one has.
     """
 
     burst: Burst
     folder: Path | None
     failed: Mapping[str, str] = field(default_factory=dict)
+    any_whole: bool = True
 
     @property
     def shortfall(self) -> str:
         """Why this is not what was asked for, and what to do; empty when it is."""
-        stopped = self.burst.outcome is BurstOutcome.ABORTED
-        if self.failed and self.folder is not None and not stopped:
+        role, outcome = self.burst.plan.role, self.burst.outcome
+        if self.failed and self.folder is not None and outcome is not BurstOutcome.ABORTED:
             missing = ", ".join(map(repr, self.failed))
             reasons = " ".join(f"{name}: {_sentence(reason)}" for name, reason in self.failed.items())
+            lacks = f"The {role} capture {self.folder.name} lacks the pictures of {missing}. {reasons}"
+            if not self.any_whole:
+                return f"{lacks} No camera's picture is whole: take it again."
+            view = shlex.quote(next(iter(self.failed)))
             return (
-                f"The {self.burst.plan.role} capture {self.folder.name} lacks the pictures of {missing}. {reasons} "
-                f"What the other cameras took is kept: airlens capture retake {_experiment_of(self.folder)} "
-                f"--view {shlex.quote(next(iter(self.failed)))} takes that camera's alone."
+                f"{lacks} What the other cameras took is kept: airlens capture retake "
+                f"{_experiment_of(self.folder)} --view {view} takes that camera's alone."
             )
-        if self.burst.outcome is BurstOutcome.COMPLETE:
+        if outcome is BurstOutcome.COMPLETE:
             return ""
         kept = "They were discarded, as asked."
         if self.folder is not None:
             kept = f"They are kept in {self.folder.name}, marked as incomplete."
-        return (
-            f"The {self.burst.plan.role} capture ended early ({self.burst.outcome.value}) after "
-            f"{self.burst.frames} of {self.burst.plan.frames} frames. {kept} Take it again."
+        ended = (
+            f"The {role} capture ended early ({outcome.value}) after {self.burst.frames} of "
+            f"{self.burst.plan.frames} frames."
         )
+        return " ".join(filter(None, (ended, kept, outcome.advice, "Take it again.")))
 
 
 def _sentence(text: str) -> str:
@@ -171,7 +177,8 @@ def _take_views(
     bursts = {number: judged(experiment, one, cameras.told, number) for number, one in found.bursts.items()}
     together_s = {"at_once": at_once} | ({} if found.apart_s is None else {"apart_s": found.apart_s})
     recorder.keep_views(bursts, names, {**origin, CAMERAS: together_s})
-    return TakenBurst(together(bursts, names), recorder.folder, found.failed)
+    any_whole = any(one.outcome is BurstOutcome.COMPLETE for one in bursts.values())
+    return TakenBurst(together(bursts, names), recorder.folder, found.failed, any_whole)
 
 
 def take_order(

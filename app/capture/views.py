@@ -127,9 +127,8 @@ class ViewCapture:
             self._bursts[number] = burst
             if burst.outcome is not BurstOutcome.COMPLETE:
                 name = self._names[number]
-                self._failed[name] = (
-                    f"{burst.outcome.value} after {burst.frames} of {self.plan.frames} frames"
-                )
+                ended = f"{burst.outcome.value} after {burst.frames} of {self.plan.frames} frames"
+                self._failed[name] = f"{ended}. {burst.outcome.advice}".rstrip()
 
     @contextmanager
     def _caught(self, number: int) -> Iterator[None]:
@@ -175,7 +174,8 @@ class ViewCapture:
         whole = [self._arrived_s[number] for number, burst in bursts.items() if burst.frames]
         same = list(zip(*whole, strict=False)) if len(whole) > 1 else []
         apart_s = max((max(times) - min(times) for times in same), default=None)
-        return ViewBursts(bursts, self._failed, tuple(self._errors), apart_s)
+        failed = {name: self._failed[name] for name in self._names if name in self._failed}
+        return ViewBursts(bursts, failed, tuple(self._errors), apart_s)
 
 
 def together(bursts: Mapping[int, Burst], names: tuple[str, ...]) -> Burst:

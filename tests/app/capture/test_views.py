@@ -16,10 +16,11 @@ from app.cli import create_cli
 from app.errors import BadInputError
 from app.experiment.capture_parts import parts_of
 from app.experiment.captures import load_capture, newest_pair
-from app.experiment.folder import open_experiment
+from app.experiment.folder import open_experiment, save_settings
 from app.experiment.rig_settings import V4l2CameraSettings
 from app.files.provenance import sha256
 from app.rig.open import air_of, named_camera, open_camera
+from app.whereabouts import whereabouts
 from drivers.burst import CapturePlan
 from drivers.clock import SystemClock
 from drivers.errors import DeviceBusyError
@@ -79,7 +80,9 @@ def run(*arguments):
     return CliRunner().invoke(create_cli(), [str(one) for one in arguments])
 
 
-def test_a_camera_that_fails_in_its_turn_leaves_no_measurement_and_is_taken_alone(folder, monkeypatch):
+def test_a_camera_that_fails_in_its_turn_leaves_no_measurement_and_is_taken_alone(
+    folder, monkeypatch, tmp_path
+):
     experiment = open_experiment(folder)
     before = experiment.latest_capture("reference")
     with monkeypatch.context() as patch, open_camera(experiment, "still") as camera:
@@ -96,6 +99,16 @@ def test_a_camera_that_fails_in_its_turn_leaves_no_measurement_and_is_taken_alon
         "part-0.json",
         "reference.tif",
     ]
+
+    # Where no reference is finished, it is what comes next; of a capture that was imported it cannot be taken.
+    alone = tmp_path / "room"
+    shutil.copytree(folder, alone, ignore=lambda at, names: [n for n in names if n == before.name])
+    following = whereabouts(alone, "EXP").next
+    assert following.command == f"airlens capture retake EXP --view 'camera at x_max' --capture {kept.name}"
+    assert "lacks the picture of camera at x_max" in following.reason
+    about = alone / "captures" / kept.name / "incomplete.json"
+    about.write_text(json.dumps(json.loads(about.read_text()) | {"origin": {"rig": "imported"}}))
+    assert whereabouts(alone, "EXP").next.command.startswith("airlens capture reference EXP")
 
     # The one that is missing, alone; the other camera's picture is the one that was kept.
     whole = sha256(kept / "reference.tif")
@@ -149,7 +162,7 @@ def test_a_burst_that_is_stopped_in_the_first_view_is_no_measurement(folder):
     assert experiment.latest_capture("reference") == before
 
 
-def test_a_real_rig_names_the_camera_of_each_view(folder):
+def test_a_real_rig_names_the_camera_of_each_view(folder, tmp_path):
     experiment = open_experiment(folder)
     first = V4l2CameraSettings(
         kind="v4l2", device="/dev/video0", width_px=160, height_px=120, exposure_s=0.01
@@ -166,6 +179,8 @@ def test_a_real_rig_names_the_camera_of_each_view(folder):
     whole = replace(experiment, settings=experiment.settings.model_copy(update={"rig": both}))
     assert named_camera(whole, 1) == second
     assert both.addresses == ("/dev/video0", "/dev/video2")
+    save_settings(copy := Path(shutil.copytree(folder, tmp_path / "room")), whole.settings)
+    assert whereabouts(copy).has["rig"].startswith("cameras /dev/video0, /dev/video2 before")
 
 
 @pytest.mark.parametrize("views", ["q", "y,y_max", "", "y,,x"])
@@ -227,6 +242,7 @@ def test_a_camera_that_is_pulled_out_in_the_middle_costs_the_other_nothing(folde
     names = ("camera", "camera at x_max")
     assert list(taken.failed) == [names[pulled]]
     assert "device lost after" in taken.shortfall
+    assert "Plug the camera in" in taken.shortfall
     assert set(seen) == {0, 1}
     kept = parts_of(taken.folder, names)
     assert kept.missing == (names[pulled],)
@@ -238,6 +254,24 @@ def test_a_camera_that_is_pulled_out_in_the_middle_costs_the_other_nothing(folde
     assert whole.shortfall == ""
     assert load_capture(taken.folder).complete
     assert "cameras" not in load_capture(taken.folder).manifest["origin"]
+    shutil.rmtree(taken.folder)
+
+
+def test_cameras_that_are_all_pulled_out_leave_nothing_to_complete(folder):
+    experiment = open_experiment(folder)
+
+    def camera(view: int) -> SimulatedCamera:
+        picture = np.full((120, 160), 0.5, np.float32)
+        return SimulatedCamera(
+            lambda: picture, seed=view, faults=lambda n: CameraFault.UNPLUG if n == 5 else None
+        )
+
+    with camera(0) as first:
+        taken = take(first, experiment, CapturePlan(frames=8), at_once=True, opens=camera)
+    assert list(taken.failed) == ["camera", "camera at x_max"]
+    assert taken.shortfall.count("Plug the camera in") == 2
+    assert taken.shortfall.endswith("No camera's picture is whole: take it again.")
+    assert not load_capture(taken.folder).complete
     shutil.rmtree(taken.folder)
 
 
