@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -179,11 +180,17 @@ class ViewCapture:
 
 
 def together(bursts: Mapping[int, Burst], names: tuple[str, ...]) -> Burst:
-    """The burst that stands for those of all views: one that ended early, else the first; the verdicts of all."""
+    """The burst that stands for those of all views: one that ended early, else the first.
+
+    It has the verdicts and the refused frames of all.
+    """
     verdicts = [
         replace(verdict, name=f"{names[number]}: {verdict.name}")
         for number, burst in bursts.items()
         for verdict in burst.verdicts
     ]
     short = [burst for burst in bursts.values() if burst.outcome is not BurstOutcome.COMPLETE]
-    return replace([*short, *bursts.values()][0], verdicts=tuple(verdicts))
+    refused: Counter[str] = Counter()
+    for burst in bursts.values():
+        refused.update(burst.refused)
+    return replace([*short, *bursts.values()][0], verdicts=tuple(verdicts), refused=dict(refused))

@@ -230,10 +230,8 @@ def test_a_camera_that_is_pulled_out_in_the_middle_costs_the_other_nothing(folde
     picture = np.full((120, 160), 0.5, np.float32)
 
     def camera(view: int) -> SimulatedCamera:
-        goes = view == pulled
-        return SimulatedCamera(
-            lambda: picture, seed=view, faults=lambda n: CameraFault.UNPLUG if goes and n == 5 else None
-        )
+        fault = {pulled: CameraFault.UNPLUG, 1 - pulled: CameraFault.ERROR_FLAG}.get(view)
+        return SimulatedCamera(lambda: picture, seed=view, faults=lambda n: fault if n == 5 else None)
 
     seen: list[int] = []
     watch = BurstWatch(frame=lambda taken, view: seen.append(view))
@@ -244,6 +242,8 @@ def test_a_camera_that_is_pulled_out_in_the_middle_costs_the_other_nothing(folde
     assert "device lost after" in taken.shortfall
     assert "Plug the camera in" in taken.shortfall
     assert set(seen) == {0, 1}
+    # The frame that the other one refused is counted.
+    assert taken.burst.refused["corrupt"] == 1
     kept = parts_of(taken.folder, names)
     assert kept.missing == (names[pulled],)
     assert kept.views[1 - pulled]["frames"] == 8
