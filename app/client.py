@@ -612,9 +612,8 @@ class Client:
     def upload(self, file: Path) -> Upload:
         """Send a PNG, TIFF, NPY or NPZ file."""
         with file.open("rb") as content:
-            answer = self._http.post(
-                "/uploads", content=content, headers={"Content-Type": "application/octet-stream"}
-            )
+            headers = {"Content-Type": "application/octet-stream"}
+            answer = self._http.post("/uploads", content=content, params={"name": file.name}, headers=headers)
         return _read(Upload, answer)
 
     def uploads(self) -> list[Upload]:
