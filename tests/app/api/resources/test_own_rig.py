@@ -183,6 +183,30 @@ def test_all_cameras_pictures_come_in_one_request_and_what_is_refused_stays(
     assert [(one["view"], one["frames"]) for one in taken["views"]] == [("camera", 8), ("second", 4)]
 
 
+def test_the_client_sends_the_pictures_of_all_cameras_at_once(
+    client: Client, two_cameras: str, tmp_path: Path
+):
+    still, moved, of_second, moved_too = (uploaded(client, tmp_path, shift) for shift in range(4))
+    # Only what is sent together is held against one another before anything is kept.
+    with pytest.raises(ServiceError, match=r"0\.tif, page 1 is named as reference of 'camera' and as"):
+        client.import_views(two_cameras, {"camera": {"reference": [still]}, "second": {"reference": [still]}})
+    assert client.captures(two_cameras) == []
+    given: dict = {
+        "camera": {"reference": [still], "flow": [moved]},
+        "second": {"reference": [of_second], "flow": [moved_too]},
+    }
+    taken = client.import_views(two_cameras, given, ambient_temperature_k=291.0)
+    assert [(one.role, one.state, one.missing) for one in taken] == [
+        ("reference", "finished", []),
+        ("flow", "finished", []),
+    ]
+    for role, shifts in ((0, (0, 2)), (1, (1, 3))):
+        for view, shift in enumerate(shifts):
+            mean = client.capture_image(two_cameras, taken[role].capture, view=view)
+            expected = np.mean(pictures((48, 64), shift), axis=0) / (2**16 - 1)
+            np.testing.assert_allclose(mean, expected, atol=1e-6)
+
+
 def test_cameras_that_were_confused_are_put_right_together(
     client: Client, live: Live, two_cameras: str, tmp_path: Path
 ):
