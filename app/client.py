@@ -378,11 +378,34 @@ class Client:
     ) -> list[CaptureResource]:
         """Make captures of uploaded pictures: the ids of the uploads for each role.
 
-        `view` is the camera that took them, by its name; of several views each one's pictures are imported by
-        themselves, and a capture waits for those that it names as `missing`.
+        `view` is the camera that took them, by its name. Of several views a capture waits for those that it names as
+        `missing`; `import_views` brings all of them together.
         """
-        roles = [{"role": role, "view": view, "uploads": list(uploads)} for role, uploads in pictures.items()]
-        body = {"pictures": roles, "bits": bits, "ambient_temperature_k": ambient_temperature_k}
+        return self._import(experiment, [(view, pictures)], bits, ambient_temperature_k)
+
+    def import_views(
+        self,
+        experiment: str,
+        views: Mapping[str, Mapping[Role, Sequence[str]]],
+        bits: int | None = None,
+        ambient_temperature_k: float | None = None,
+    ) -> list[CaptureResource]:
+        """Make captures of uploaded pictures of several cameras in one request: those of each view, by its name."""
+        return self._import(experiment, list(views.items()), bits, ambient_temperature_k)
+
+    def _import(
+        self,
+        experiment: str,
+        views: Sequence[tuple[str | None, Mapping[Role, Sequence[str]]]],
+        bits: int | None,
+        ambient_temperature_k: float | None,
+    ) -> list[CaptureResource]:
+        given = [
+            {"role": role, "view": view, "uploads": list(uploads)}
+            for view, pictures in views
+            for role, uploads in pictures.items()
+        ]
+        body = {"pictures": given, "bits": bits, "ambient_temperature_k": ambient_temperature_k}
         path = f"/experiments/{experiment}/captures/imported"
         return self._ask(list[CaptureResource], "POST", path, body)
 
@@ -612,9 +635,8 @@ class Client:
     def upload(self, file: Path) -> Upload:
         """Send a PNG, TIFF, NPY or NPZ file."""
         with file.open("rb") as content:
-            answer = self._http.post(
-                "/uploads", content=content, headers={"Content-Type": "application/octet-stream"}
-            )
+            headers = {"Content-Type": "application/octet-stream"}
+            answer = self._http.post("/uploads", content=content, params={"name": file.name}, headers=headers)
         return _read(Upload, answer)
 
     def uploads(self) -> list[Upload]:

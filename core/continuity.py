@@ -42,12 +42,12 @@ def moved_as_air(
 
 def left_out(moved: Sequence[Bool[np.ndarray, " _"]]) -> tuple[str, ...]:
     """A sentence on the windows that did not move as air does, each view's by `moved_as_air`; none without any."""
-    alone = sum(int((~view).sum()) for view in moved)
+    alone, total = sum(int((~view).sum()) for view in moved), sum(len(view) for view in moved)
     if alone == 0:
         return ()
     return (
-        f"{alone} windows show a shift that no air has: none near them shows half of it. They are left out; "
-        "something there moved.",
+        f"{alone} of {total} windows ({100 * alone / total:.2g} %) show a shift that no air has: none near them "
+        "shows half of it. They are left out; something there moved.",
     )
 
 

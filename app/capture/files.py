@@ -5,7 +5,7 @@ Colour becomes grey: a pattern has no colour.
 """
 
 import glob
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import ModuleType
@@ -50,14 +50,20 @@ def picture_files(names: list[str]) -> list[Path]:
 
 
 class PictureFiles:
-    """A camera whose frames are the pictures of some files, one after the other. `frames` counts them."""
+    """A camera whose frames are the pictures of some files, one after the other. `frames` counts them.
 
-    def __init__(self, files: list[Path], bits: int | None = None) -> None:
+    `called` says what their owner calls files that lie here under other names.
+    """
+
+    def __init__(
+        self, files: list[Path], bits: int | None = None, called: Mapping[Path, str] | None = None
+    ) -> None:
         self._files, self._bits, self._taken = files, bits, 0
+        self._called = called or {}
         self._pages = self._frames()
         first = next(self._frames(), None)
         if first is None:
-            raise BadInputError(f"{files[0]} holds no picture. Export it again.")
+            raise BadInputError(f"{self._said(files[0])} holds no picture. Export it again.")
         self._shape, self._itemsize = first.shape, first.itemsize
 
     @property
@@ -92,7 +98,8 @@ class PictureFiles:
     @property
     def origin(self) -> dict[str, Any]:
         """Where the frames come from, for the capture's manifest."""
-        return {"rig": "imported", "files": [{"name": f.name, "sha256": sha256(f)} for f in self._files]}
+        files = [{"name": self._called.get(f, f.name), "sha256": sha256(f)} for f in self._files]
+        return {"rig": "imported", "files": files}
 
     @property
     def lossy(self) -> bool:
@@ -127,53 +134,57 @@ class PictureFiles:
     def _frames(self) -> Generator[Pixels, None, None]:
         shape = None
         for file in self._files:
-            for pixels in _read(file):
+            said = self._said(file)
+            for pixels in _read(file, said):
                 shape = shape or pixels.shape
-                self._check(file, pixels, shape)
+                self._check(said, pixels, shape)
                 yield pixels
 
-    def _check(self, file: Path, pixels: np.ndarray, shape: tuple[int, ...]) -> None:
+    def _said(self, file: Path) -> str:
+        return self._called.get(file, str(file))
+
+    def _check(self, said: str, pixels: np.ndarray, shape: tuple[int, ...]) -> None:
         if pixels.shape != shape:
             raise BadInputError(
-                f"{file} has {pixels.shape[1]} x {pixels.shape[0]} px, the first picture {shape[1]} x {shape[0]}. "
+                f"{said} has {pixels.shape[1]} x {pixels.shape[0]} px, the first picture {shape[1]} x {shape[0]}. "
                 "Take all pictures with one camera at one size."
             )
         if self._bits is not None and pixels.max(initial=0) > 2**self._bits - 1:
             raise BadInputError(
-                f"{file} holds {pixels.max()} counts; {self._bits} bits hold at most {2**self._bits - 1}. "
+                f"{said} holds {pixels.max()} counts; {self._bits} bits hold at most {2**self._bits - 1}. "
                 "Give the bits of the camera's counts."
             )
 
 
-def _read(file: Path) -> Iterator[Pixels]:
-    with reading(file, "It may be truncated: export it again."):
+def _read(file: Path, said: str) -> Iterator[Pixels]:
+    with reading(said, "It may be truncated: export it again."):
         if file.suffix.lower() in RAW_SUFFIXES:
             yield _read_raw(file)
         elif file.suffix == ".npy":
-            yield _counts(file, np.load(file, allow_pickle=False))
+            yield _counts(said, np.load(file, allow_pickle=False))
         elif file.suffix.lower() in (".tif", ".tiff"):
-            yield from _read_tiff(file)
+            yield from _read_tiff(file, said)
         else:
             pixels = cv2.imdecode(np.fromfile(file, np.uint8), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
             if pixels is None:
                 raise ValueError("no picture in it")
-            yield _counts(file, pixels)
+            yield _counts(said, pixels)
 
 
-def _read_tiff(file: Path) -> Iterator[Pixels]:
+def _read_tiff(file: Path, said: str) -> Iterator[Pixels]:
     with tifffile.TiffFile(file) as opened:
         for page in opened.pages:
             if page.aspage().size > LARGEST_PX:
-                raise BadInputError(f"{file} has more than {LARGEST_PX:,} pixels. Crop it.")
-            yield _counts(file, page.asarray())
+                raise BadInputError(f"{said} has more than {LARGEST_PX:,} pixels. Crop it.")
+            yield _counts(said, page.asarray())
 
 
-def _counts(file: Path, pixels: np.ndarray) -> Pixels:
+def _counts(said: str, pixels: np.ndarray) -> Pixels:
     if pixels.ndim == 3 and pixels.shape[2] in (3, 4) and pixels.dtype in (np.uint8, np.uint16):
         pixels = cv2.cvtColor(np.ascontiguousarray(pixels[..., :3]), cv2.COLOR_RGB2GRAY)
     if pixels.ndim != 2 or pixels.dtype not in (np.uint8, np.uint16):
         raise BadInputError(
-            f"{file} holds {pixels.dtype} of shape {pixels.shape}; expected pictures of 8 or 16 bits, grey or "
+            f"{said} holds {pixels.dtype} of shape {pixels.shape}; expected pictures of 8 or 16 bits, grey or "
             "colour. Export the camera's counts without scaling them."
         )
     return pixels

@@ -54,26 +54,29 @@ def import_files(
     told: Conditions = UNTOLD,
     watch: BurstWatch = UNWATCHED,
     lossy: Collection[TakenBy] = (),
+    called: Mapping[Path, str] | None = None,
 ) -> list[TakenBurst]:
     """One capture for each role that has pictures: mean, scatter and count of each pixel, and verdicts.
 
     Where some views have none yet the capture waits for them, and `TakenBurst.failed` names them. `bits` are those of
     the counts, by default all that the files have. Their size is held against the view's camera before any capture is
-    made. `lossy` are those whose pictures had been compressed before they became these files. Raises BadInputError.
+    made. `lossy` are those whose pictures had been compressed before they became these files. `called` says what
+    their owner calls files that lie here under other names. Raises BadInputError.
     """
     if not given:
         raise BadInputError(
             "No picture was given. Name the pictures of at least one role: --reference, --flow."
         )
     views = {shown: view_number(experiment, shown.view) for shown in given}
-    _check_apart(given)
+    _check_apart(given, called or {})
     for shown, files in given.items():
-        _check_size(experiment, PictureFiles(files, bits), shown.role, views[shown])
+        pictures = PictureFiles(files, bits, called)
+        _check_size(experiment, pictures, shown.role, views[shown])
         with_it = {views[one] for one in given if one.role == shown.role}
-        _check_new(experiment, PictureFiles(files, bits), shown.role, views[shown], with_it)
+        _check_new(experiment, pictures, shown.role, views[shown], with_it)
     taken: dict[Path | None, TakenBurst] = {}
     for shown, files in sorted(given.items(), key=lambda one: (ROLES.index(one[0].role), views[one[0]])):
-        with PictureFiles(files, bits) as pictures:
+        with PictureFiles(files, bits, called) as pictures:
             known = _verdicts(pictures, pictures.lossy or shown in lossy)
             one = _brought(experiment, pictures, shown.role, views[shown], known, told, watch)
         taken[one.folder] = one
@@ -127,7 +130,7 @@ def _waiting(experiment: Experiment, role: CaptureRole) -> Path | None:
     return None
 
 
-def _check_apart(given: Mapping[TakenBy, list[Path]]) -> None:
+def _check_apart(given: Mapping[TakenBy, list[Path]], called: Mapping[Path, str]) -> None:
     """Raise BadInputError for a picture that is named twice, or is in two views' files."""
     seen: dict[object, TakenBy] = {}
     several = len({shown.view for shown in given}) > 1
@@ -138,8 +141,8 @@ def _check_apart(given: Mapping[TakenBy, list[Path]]) -> None:
                 other = seen.setdefault(known, shown)
                 if other != shown:
                     raise BadInputError(
-                        f"{file} is named as {_said(other)} and as {_said(shown)}. Keep the pictures of each in a "
-                        "folder of their own."
+                        f"{called.get(file, file)} is named as {_said(other)} and as {_said(shown)}. Keep the "
+                        "pictures of each in a folder of their own."
                     )
 
 

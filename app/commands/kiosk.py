@@ -1,15 +1,13 @@
 """`airlens kiosk`: show a picture on a projector through a browser, pixel for pixel; of several, on each its own."""
 
-import contextlib
 import json
-from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from drivers.display import PatternDisplay, Picture
+    from drivers.display import Picture
 
 
 def register(cli: typer.Typer) -> None:
@@ -46,6 +44,7 @@ def kiosk(
     import time
 
     from app.capture.burst import interruptible
+    from app.rig.screens import open_screens
 
     whose, pictures = _pictures(shown, identify, view, pattern)
 
@@ -59,7 +58,7 @@ def kiosk(
         text = f"On screen, pixel for pixel{on}: {cols} x {rows}, sha256 {digest}"
         typer.echo(json.dumps(size | ({"view": whose[number]} if on else {})) if as_json else text)
 
-    with _opened(screen, whose, port, say, wait) as displays, interruptible() as stopped:
+    with open_screens(screen, whose, port, say, wait) as displays, interruptible() as stopped:
         for number, display in displays.items():
             put = getattr(display, "put", None)
             if put is not None:  # pages draw side by side
@@ -70,26 +69,6 @@ def kiosk(
             time.sleep(0.1)
 
 
-@contextlib.contextmanager
-def _opened(
-    screen: str, whose: "dict[int, str]", port: int, say: "Callable[[str], object]", wait_s: float
-) -> "Iterator[Mapping[int, PatternDisplay]]":
-    from app.errors import BadInputError
-    from app.rig.screens import open_pages, open_screen
-
-    if screen == "kiosk":
-        with open_pages(whose, port, say, wait_s) as pages:
-            yield pages
-        return
-    if len(whose) > 1:
-        named = ", ".join(repr(name) for name in whose.values())
-        raise BadInputError(
-            f"A card shows one picture, and there are the projectors of {named}. Give --view."
-        )
-    with open_screen(screen, port, say, wait_s) as display:
-        yield dict.fromkeys(whose, display)
-
-
 def _pictures(
     shown: Path | None, identify: str | None, view: str | None, pattern: str
 ) -> "tuple[dict[int, str], dict[int, Picture]]":
@@ -98,7 +77,7 @@ def _pictures(
 
     from app.errors import BadInputError
     from app.experiment.folder import open_experiment
-    from app.experiment.views import lamp_number, projectors, view_names, view_number
+    from app.experiment.views import chosen_projectors
     from app.rig.patterns import PatternName, pattern_picture
 
     if shown is None or not shown.is_dir():
@@ -111,15 +90,8 @@ def _pictures(
     if pattern not in known:
         raise BadInputError(f"--pattern {pattern!r} is not known; expected one of {', '.join(known)}.")
     experiment = open_experiment(shown)
-    # Where there is no projector the first view says so.
-    numbers = (
-        projectors(experiment) or (0,)
-        if view is None
-        else (lamp_number(experiment, view_number(experiment, view)),)
-    )
-    names = view_names(experiment)
-    made = {number: pattern_picture(experiment, known[pattern], number) for number in numbers}
-    return {number: names[number] if len(names) > 1 else "" for number in numbers}, made
+    whose = chosen_projectors(experiment, view)
+    return whose, {number: pattern_picture(experiment, known[pattern], number) for number in whose}
 
 
 def _picture(path: Path | None, identify: str | None):

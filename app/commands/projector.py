@@ -71,22 +71,31 @@ def check(
     screen: Annotated[
         str, typer.Option(help="kiosk (a page, opened on the projector), or a card such as /dev/dri/card0.")
     ] = "kiosk",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the kiosk page.")] = 8766,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the kiosk pages.")] = 8766,
+    view: Annotated[str | None, typer.Option(help="Only the projector that lights this view.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Show the scene's pattern and let the camera say whether it sees what was sent."""
-    from app.capture.pattern_check import check_projector
+    """Show the pattern of each projector and let its camera say whether it sees what was sent."""
+    from app.capture.pattern_check import check_projectors
+    from app.errors import AirlensError
     from app.experiment.folder import open_experiment
+    from drivers.verdict import Verdict
 
-    verdict = check_projector(
-        open_experiment(experiment), screen, port, lambda text: typer.echo(text, err=True)
-    )
-    if as_json:
-        typer.echo(json.dumps(asdict(verdict)))
-    else:
-        advice = "" if verdict.good else f" {verdict.advice}"
-        typer.echo(f"{verdict.name}: {verdict.value:.3f}; expected {verdict.expected}.{advice}")
-    if not verdict.good:
+    opened, failed, good = open_experiment(experiment), [], True
+    for name, found in check_projectors(opened, screen, port, lambda text: typer.echo(text, err=True), view):
+        whose = f"{name}: " if name else ""
+        if not isinstance(found, Verdict):
+            failed.append(f"{whose}{found}")
+            continue
+        good &= found.good
+        if as_json:
+            typer.echo(json.dumps(asdict(found) | ({"view": name} if name else {})))
+        else:
+            advice = "" if found.good else f" {found.advice}"
+            typer.echo(f"{whose}{found.name}: {found.value:.3f}; expected {found.expected}.{advice}")
+    if failed:
+        raise AirlensError(" ".join(failed))
+    if not good:
         raise typer.Exit(1)
 
 

@@ -67,6 +67,18 @@ def projectors(experiment: Experiment) -> tuple[int, ...]:
     return tuple(n for n in lamps(experiment) if n not in printed_walls(experiment))
 
 
+def chosen_projectors(experiment: Experiment, view: str | None) -> dict[int, str]:
+    """By their numbers the projectors, or the one that lights the view called so: whose each is, of several views.
+
+    The first view's where there is none: who asks for its pattern is told so. Raises BadInputError.
+    """
+    names = view_names(experiment)
+    found = projectors(experiment) or (0,)
+    if view is not None:
+        found = (lamp_number(experiment, view_number(experiment, view)),)
+    return {number: names[number] if len(names) > 1 else "" for number in found}
+
+
 def take_turns(experiment: Experiment) -> bool:
     """Whether one camera takes the pictures of several views, under one projector after the other."""
     return any(view.camera_of is not None for view in experiment.settings.scene.views)

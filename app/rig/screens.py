@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
+from app.errors import BadInputError
 from app.kiosk.screens import KioskScreens, page_of
 from app.kiosk.server import serve_kiosk
 from drivers.display import PatternDisplay
@@ -24,6 +25,27 @@ def open_screen(
         return
     with open_pages({0: ""}, port, say, wait_s) as displays:
         yield displays[0]
+
+
+@contextlib.contextmanager
+def open_screens(
+    screen: str, projectors: Mapping[int, str], port: int, say: Callable[[str], object], wait_s: float = 120.0
+) -> Iterator[Mapping[int, PatternDisplay]]:
+    """As `open_screen`, for each projector by its number; the name says whose it is, where there are several.
+
+    Raises BadInputError for a card and several projectors.
+    """
+    if screen == "kiosk":
+        with open_pages(projectors, port, say, wait_s) as pages:
+            yield pages
+        return
+    if len(projectors) > 1:
+        named = ", ".join(repr(name) for name in projectors.values())
+        raise BadInputError(
+            f"A card shows one picture, and there are the projectors of {named}. Give --view."
+        )
+    with open_screen(screen, port, say, wait_s) as display:
+        yield dict.fromkeys(projectors, display)
 
 
 @contextlib.contextmanager

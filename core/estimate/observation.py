@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 from scipy.interpolate import RegularGridInterpolator
 
 from core.continuity import moved_as_air
@@ -67,14 +67,16 @@ def _apply(
 
 
 def shift_blocks(
-    scene: Scene, view: int, measured: ShiftMeasurement, vertices: tuple[int, int, int]
+    scene: Scene,
+    view: int,
+    measured: ShiftMeasurement,
+    used: Bool[np.ndarray, " windows"],
+    vertices: tuple[int, int, int],
 ) -> ShiftBlocks | None:
-    """Pool one view's windows; None if no window looks at the back wall away from its edges."""
+    """Pool those of one view's windows that are used; None without any."""
     operator = build(scene, view, measured.centres_px, vertices, float(measured.window_px))
     block_px = _block_px(facing(scene, view)[0].room, operator, measured)
     cell = np.floor(measured.centres_px / block_px).astype(int)
-    used = away_from_walls(scene, view, measured.centres_px, WALL_MARGIN)
-    used &= moved_as_air(measured, used)
     if not used.any():
         return None
     key = cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1]
@@ -111,11 +113,13 @@ def _block_px(room: Box, operator: StraightRayOperator, measured: ShiftMeasureme
 class Observations(eqx.Module):
     """All data of a problem as one vector.
 
-    `outlets` are those with a thermometer, each with its place among the scene's outlets.
+    `outlets` are those with a thermometer, each with its place among the scene's outlets. `moved` are each view's
+    windows that moved as air does; the others are in none of the `shifts`.
     """
 
     scene: Scene = eqx.field(static=True)
     shifts: tuple[ShiftBlocks, ...]
+    moved: tuple[Bool[np.ndarray, " _"], ...]
     planes: tuple[PlaneData, ...]
     sensors: tuple[SensorData, ...]
     outlets: tuple[tuple[int, Outlet, float], ...] = eqx.field(static=True)
@@ -202,10 +206,13 @@ class Observations(eqx.Module):
 def observations(problem: Problem, vertices: tuple[int, int, int]) -> Observations:
     """A problem's measurements, to be compared with rooms on `vertices`."""
     scene = problem.scene
-    blocks = [shift_blocks(scene, n, shift, vertices) for n, shift in enumerate(problem.shifts)]
+    away = [away_from_walls(scene, n, of.centres_px, WALL_MARGIN) for n, of in enumerate(problem.shifts)]
+    moved = tuple(moved_as_air(*of) for of in zip(problem.shifts, away, strict=True))
+    blocks = [shift_blocks(scene, n, of, away[n] & moved[n], vertices) for n, of in enumerate(problem.shifts)]
     return Observations(
         scene,
         tuple(b for b in blocks if b is not None),
+        moved,
         problem.planes,
         problem.sensors,
         tuple(measured_outlets(scene)),

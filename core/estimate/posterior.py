@@ -6,6 +6,7 @@ from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
 
 from core.air import GRAVITY_M_S2
+from core.continuity import left_out
 from core.estimate.diagnostics import (
     balances,
     contradictions,
@@ -108,6 +109,7 @@ def sentences(analysis: Analysis, error: ModelError, doubt: float, moved_k: floa
     return [
         *analysis.layout.notes,
         *undetermined(analysis.problem),
+        *left_out(analysis.data.moved),
         *contradictions(analysis.problem, analysis.prior, analysis.posterior, np.abs(error.moved[0]), doubt),
         *misfit(analysis.data, explained(analysis.data, analysis.best.fields), error),
         *doubtful(doubt),

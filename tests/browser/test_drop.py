@@ -3,11 +3,13 @@
 import base64
 import re
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
 import numpy as np
-from playwright.sync_api import JSHandle, Locator, Page, expect
+import pytest
+from playwright.sync_api import JSHandle, Locator, Page, Route, expect
 
 from app.client import Client
 from tests.browser.conftest import Opens, Station, snapshot
@@ -153,3 +155,66 @@ def test_each_camera_has_its_own_pictures_and_none_are_lost(station: Station, op
     expect(library.get_by_role("img")).to_have_count(2)
     expect(library).to_have_count(2)
     assert [one for one in watched.complaints if "422" not in one] == []
+
+
+@pytest.fixture
+def looking(station: Station, opens: Opens, tmp_path: Path) -> Iterator[tuple[Page, Client, str, str]]:
+    """The page with four references chosen for each of two cameras; the experiment, and another one."""
+    own = two_views(station, camera_px=96)
+    with Client(f"http://127.0.0.1:{station.port}", station.token) as client:
+        other = client.create_experiment("Another room", camera_px=96).experiment
+        watched = opens(station.address)
+        watched.page.get_by_label("Experiment", exact=True).select_option(own)
+        go_to(watched.page, "Capture")
+        watched.page.get_by_text("Import pictures that another camera took").click()
+        for number, wall in enumerate(("y_max", "x_max")):
+            camera = watched.page.get_by_label("Camera that took them")
+            camera.select_option(f"{VIEWS[number]}: wall {wall}")
+            reference(watched.page).set_input_files(frames_of(tmp_path / f"{number}", 96, number))
+        yield watched.page, client, own, other
+        assert watched.complaints == []
+
+
+def reference(page: Page) -> Locator:
+    return page.get_by_role("group", name="Reference: still air").locator("input")
+
+
+def test_chosen_pictures_wait_while_another_experiment_or_page_is_looked_at(
+    looking: tuple[Page, Client, str, str], tmp_path: Path
+):
+    page, _, own, other = looking
+    field, chosen = reference(page), page.get_by_label("Experiment", exact=True)
+    chosen.select_option(other)
+    expect(page.get_by_role("button", name="Import 0 files")).to_be_disabled()
+    expect(field).to_have_js_property("files.length", 0)
+    field.set_input_files(frames_of(tmp_path / "other", 96, 2)[:3])
+    chosen.select_option(own)
+    expect(page.locator("details.import")).to_contain_text(f"{VIEWS[0]}: 4, {VIEWS[1]}: 4.")
+    go_to(page, "Rig")
+    go_to(page, "Capture")
+    expect(page.get_by_role("button", name="Import 8 files")).to_be_visible()
+    expect(field).to_have_js_property("files.length", 4)
+    snapshot(page, "import-kept")
+    page.get_by_role("button", name="Choose none").click()
+    expect(page.get_by_role("button", name="Import 0 files")).to_be_disabled()
+    expect(field).to_have_js_property("files.length", 0)
+    chosen.select_option(other)
+    expect(page.get_by_role("button", name="Import 3 files")).to_be_visible()
+
+
+def test_pictures_go_to_the_experiment_that_they_were_chosen_for(looking: tuple[Page, Client, str, str]):
+    page, client, own, other = looking
+    chosen = page.get_by_label("Experiment", exact=True)
+    held_back: list[Route] = []
+    page.route("**/api/uploads?*", lambda one: held_back.append(one), times=1)
+    with page.expect_request("**/api/uploads?*"):
+        page.get_by_role("button", name="Import 8 files").click()
+    chosen.select_option(other)
+    expect(page.get_by_role("button", name="Import 0 files")).to_be_disabled()
+    with page.expect_response("**/captures/imported"):
+        held_back[0].continue_()
+    assert [one.state for one in client.captures(own)] == ["finished"]
+    assert client.captures(other) == []
+    chosen.select_option(own)
+    expect(page.locator(".library li")).to_have_count(1)
+    expect(page.get_by_role("button", name="Import 0 files")).to_be_disabled()

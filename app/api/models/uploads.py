@@ -20,9 +20,13 @@ class UploadedArray(WireModel):
 
 
 class Upload(WireModel):
-    """A file that was checked, read and kept; `reason` says why a `broken` one cannot be read any more."""
+    """A file that was checked, read and kept; `reason` says why a `broken` one cannot be read any more.
+
+    `name` is what its sender calls it.
+    """
 
     upload: str
+    name: str = ""
     kind: Literal["png", "jpeg", "tiff", "npy", "npz", "broken"]
     bytes: int = 0
     sha256: str = ""

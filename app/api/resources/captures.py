@@ -1,6 +1,6 @@
 """Captures: take, watch, abort, keep or discard, look at, annotate."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Literal
@@ -86,15 +86,17 @@ def import_captures(given: Given, experiment: Identifier, new: NewImport) -> lis
     """Make captures of uploaded pictures that another camera took; the uploads are removed."""
     found = given.folders.open(experiment)
     files: dict[TakenBy, list[Path]] = {}
+    called: dict[Path, str] = {}
     for one in new.pictures:
-        files.setdefault(TakenBy(one.role, one.view), []).extend(
-            path for upload in one.uploads for path in _pictures(given, upload)
-        )
+        for upload in one.uploads:
+            pictures = _pictures(given, upload)
+            files.setdefault(TakenBy(one.role, one.view), []).extend(pictures)
+            called |= pictures
     lossy = [
         TakenBy(one.role, one.view) for one in new.pictures if "jpeg" in map(given.uploads.kind, one.uploads)
     ]
     told = Conditions(new.ambient_temperature_k)
-    taken = import_files(found, files, new.bits, told, lossy=lossy)
+    taken = import_files(found, files, new.bits, told, lossy=lossy, called=called)
     for one in new.pictures:
         for upload in one.uploads:
             given.uploads.delete(upload)
@@ -103,7 +105,7 @@ def import_captures(given: Given, experiment: Identifier, new: NewImport) -> lis
     return [capture_line(burst.folder, names) for burst in taken if burst.folder is not None]
 
 
-def _pictures(given: Services, upload: str) -> Sequence[Path]:
+def _pictures(given: Services, upload: str) -> Mapping[Path, str]:
     found = given.uploads.pictures(upload)
     if not found:
         raise ApiError(

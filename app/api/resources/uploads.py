@@ -1,8 +1,8 @@
 """Files that an operator sends: PNG, JPEG, TIFF, NPY and NPZ, as the raw body of one request."""
 
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Query, Request
 from pydantic import ValidationError
 
 from app.api.models.uploads import Upload
@@ -12,6 +12,9 @@ from app.api.wire.problems import ApiError
 from app.errors import BadInputError
 
 router = APIRouter(tags=["uploads"])
+FileName = Annotated[
+    str, Query(max_length=255, description="What its sender calls the file: what is said of it names it so.")
+]
 BINARY = {"schema": {"type": "string", "format": "binary"}}
 BODY = {"requestBody": {"required": True, "content": {"application/octet-stream": BINARY}}}
 
@@ -36,15 +39,16 @@ def _line(manifest: dict[str, Any]) -> Upload:
 
 
 @router.post("/uploads", status_code=201, openapi_extra=BODY)
-async def add_upload(given: Given, request: Request) -> Upload:
+async def add_upload(given: Given, request: Request, name: FileName = "") -> Upload:
     """Stream a file in, check what it declares, read it in a limited process, keep its arrays."""
     if request.headers.get("content-type") != "application/octet-stream":
         raise ApiError("media_type_refused", "An upload is sent as application/octet-stream.")
     try:
-        return Upload.model_validate(await given.uploads.add(request.stream()))
+        return Upload.model_validate(await given.uploads.add(request.stream(), name))
     except BadInputError as error:
         # Nothing more of a refused file is read.
-        raise ApiError("content_refused", str(error), headers={"Connection": "close"}) from error
+        said = f"{name}: {error}" if name else str(error)
+        raise ApiError("content_refused", said, headers={"Connection": "close"}) from error
 
 
 @router.delete("/uploads/{upload}", status_code=204)

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -53,8 +53,11 @@ class UploadStore:
     def _folders(self) -> list[Path]:
         return [path.parent for path in self._folder.glob(f"u*/{MANIFEST}")]
 
-    async def add(self, chunks: AsyncIterator[bytes]) -> dict[str, Any]:
-        """Return the manifest of a new upload; BadInputError, with nothing kept, if it cannot be used."""
+    async def add(self, chunks: AsyncIterator[bytes], called: str = "") -> dict[str, Any]:
+        """Return the manifest of a new upload; BadInputError, with nothing kept, if it cannot be used.
+
+        `called` is what its sender calls the file.
+        """
         if len(self._folders()) >= self._limits.stored:
             raise BadInputError(
                 f"There are {self._limits.stored} uploads already. Delete some that are no longer needed."
@@ -63,7 +66,7 @@ class UploadStore:
         hidden = self._folder / f".{name}"
         hidden.mkdir()
         try:
-            manifest = {"upload": name, **await self._read(hidden, chunks)}
+            manifest = {"upload": name, "name": called, **await self._read(hidden, chunks)}
             await asyncio.to_thread(_publish, hidden, self._folder / name, manifest)
         finally:
             shutil.rmtree(hidden, ignore_errors=True)
@@ -102,12 +105,15 @@ class UploadStore:
         named = [str(manifest["upload"]) for manifest in self.list() if manifest.get("kind") == "npz"]
         return [upload for upload in named if self.room(upload) is not None]
 
-    def pictures(self, upload: str) -> Sequence[Path]:
-        """The arrays (NPY) of an upload that holds pictures; empty for any other."""
+    def pictures(self, upload: str) -> Mapping[Path, str]:
+        """The arrays (NPY) of an upload that holds pictures, and what its sender calls each; empty for any other."""
         folder = self.folder(upload)
         if folder is None or self.kind(upload) not in PICTURE_KINDS:
-            return []
-        return [folder / f"{one['name']}.npy" for one in read_json(folder / MANIFEST, AGAIN)["arrays"]]
+            return {}
+        manifest = read_json(folder / MANIFEST, AGAIN)
+        arrays, called = manifest["arrays"], str(manifest.get("name") or upload)
+        pages = [f", page {number}" if len(arrays) > 1 else "" for number in range(1, len(arrays) + 1)]
+        return {folder / f"{one['name']}.npy": called + page for one, page in zip(arrays, pages, strict=True)}
 
     def kind(self, upload: str) -> str:
         """What kind of file it was; empty where there is no such upload."""

@@ -137,4 +137,4 @@ def test_the_camera_sees_what_the_simulated_projector_shows(tmp_path):
         ExperimentSettings(scene=dataclasses.replace(scene, light=FixedTexture())),
     )
     refused = CliRunner().invoke(create_cli(), ["projector", "check", str(lit_otherwise)])
-    assert "no projector" in str(refused.exception)
+    assert "nothing to project" in str(refused.exception)

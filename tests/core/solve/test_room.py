@@ -154,6 +154,23 @@ def test_images_repair_a_supply_that_was_entered_wrongly(moved: bool):
     assert found.informed.max() > 0.3
 
 
+def test_windows_on_something_that_moved_are_told(truth: Solution):
+    problem = measured(scene(SUPPLY), truth, 1e-5)
+    (shift,) = problem.shifts
+    on_it = np.all(np.abs(shift.centres_px - (104.0, 104.0)) < (9.0, 20.0), axis=1)
+    by_px = np.where(on_it[:, None], (4.0, -0.3), shift.displacement_px)
+    spoilt = replace(problem, shifts=(replace(shift, displacement_px=by_px),))
+
+    without, found = solve_room(problem, SHORT), solve_room(spoilt, SHORT)
+
+    assert not any("no air has" in note for note in without.notes)
+    (told,) = (note for note in found.notes if "no air has" in note)
+    assert told.startswith("3 of 144 windows (2.1 %) show a shift")
+    # So few windows less say hardly anything else.
+    apart_k = np.abs(found.temperature_k - without.temperature_k)
+    assert apart_k.max() < 0.02 * np.ptp(without.temperature_k)
+
+
 def test_derivatives_that_point_the_wrong_way_leave_a_room_no_worse_than_stated(truth: Solution):
     wrong = replace(SUPPLY, temperature_k=304.15, velocity_m_s=(0.44, 0.0, 0.0))
     problem = measured(scene(wrong), truth, 1e-5)

@@ -103,8 +103,8 @@ export async function file<R extends Request>(request: R, given: Given<R>): Prom
 }
 
 /** Sends a file to be kept, whose id later requests name. */
-export async function upload(content: Blob): Promise<Answer<"POST /uploads">> {
-  const answer = await reach("POST", address("POST /uploads", {}), content);
+export async function upload(content: File): Promise<Answer<"POST /uploads">> {
+  const answer = await reach("POST", address("POST /uploads", { name: content.name }), content);
   return (await answer.json()) as Answer<"POST /uploads">;
 }
 

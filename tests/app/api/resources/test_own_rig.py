@@ -1,5 +1,6 @@
 """Doors of a lab's own rig: found cameras, ports, uploaded rooms, pictures of other cameras, prints."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 import tifffile
 
 from app.client import Client, ServiceError
+from app.experiment.captures import load_capture
 from app.experiment.folder import open_experiment, save_settings
 from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.file import read_volume
@@ -118,7 +120,7 @@ def two_cameras(client: Client, live: Live) -> str:
 
 
 def uploaded(client: Client, folder: Path, shift: int, shape: tuple[int, int] = (48, 64)) -> str:
-    """The upload of a TIFF of four pictures."""
+    """The upload of a TIFF of four pictures, named after the shift."""
     path = folder / f"{shift}.tif"
     tifffile.imwrite(path, np.stack(pictures(shape, shift)), photometric="minisblack")
     return client.upload(path).upload
@@ -160,7 +162,7 @@ def test_all_cameras_pictures_come_in_one_request_and_what_is_refused_stays(
         ((("flow", "camera", [first]), ("flow", "second", [wide])), "100 x 48 px; the camera 'second'"),
         (
             (("flow", "camera", [second]), ("flow", "second", [again])),
-            "flow of 'camera' and as flow of 'second'",
+            "1.tif, page 1 is named as flow of 'camera' and as flow of 'second'",
         ),
         ((("flow", "camera", [first]), ("flow", "third", [second])), "no view 'third'"),
     ):
@@ -181,19 +183,91 @@ def test_all_cameras_pictures_come_in_one_request_and_what_is_refused_stays(
     assert [(one["view"], one["frames"]) for one in taken["views"]] == [("camera", 8), ("second", 4)]
 
 
+def test_the_client_sends_the_pictures_of_all_cameras_at_once(
+    client: Client, two_cameras: str, tmp_path: Path
+):
+    still, moved, of_second, moved_too = (uploaded(client, tmp_path, shift) for shift in range(4))
+    # Only what is sent together is held against one another before anything is kept.
+    with pytest.raises(ServiceError, match=r"0\.tif, page 1 is named as reference of 'camera' and as"):
+        client.import_views(two_cameras, {"camera": {"reference": [still]}, "second": {"reference": [still]}})
+    assert client.captures(two_cameras) == []
+    given: dict = {
+        "camera": {"reference": [still], "flow": [moved]},
+        "second": {"reference": [of_second], "flow": [moved_too]},
+    }
+    taken = client.import_views(two_cameras, given, ambient_temperature_k=291.0)
+    assert [(one.role, one.state, one.missing) for one in taken] == [
+        ("reference", "finished", []),
+        ("flow", "finished", []),
+    ]
+    for role, shifts in ((0, (0, 2)), (1, (1, 3))):
+        for view, shift in enumerate(shifts):
+            mean = client.capture_image(two_cameras, taken[role].capture, view=view)
+            expected = np.mean(pictures((48, 64), shift), axis=0) / (2**16 - 1)
+            np.testing.assert_allclose(mean, expected, atol=1e-6)
+
+
 def test_cameras_that_were_confused_are_put_right_together(
     client: Client, live: Live, two_cameras: str, tmp_path: Path
 ):
     wrong, of_camera, of_second = (uploaded(client, tmp_path, shift) for shift in (1, 0, 1))
     assert imported(live, two_cameras, ("reference", "camera", [wrong])).json()[0]["missing"] == ["second"]
     alone = imported(live, two_cameras, ("reference", "second", [of_second]))
-    assert "was imported as the reference of 'camera' already" in alone.json()["detail"]
+    assert re.match(
+        r"1\.tif, page \d was imported as the reference of 'camera' already", alone.json()["detail"]
+    )
     right = (("reference", "camera", [of_camera]), ("reference", "second", [of_second]))
     (taken,) = imported(live, two_cameras, *right).json()
     assert taken["state"] == "finished"
     for view in (0, 1):
         mean = client.capture_image(two_cameras, taken["capture"], view=view)
         np.testing.assert_allclose(mean, np.mean(pictures((48, 64), view), axis=0) / (2**16 - 1), atol=1e-6)
+
+
+def test_what_is_wrong_with_a_picture_names_it_as_its_owner_does(client: Client, live: Live, tmp_path: Path):
+    made = client.create_experiment(camera_px=64).experiment
+    for name, picture in (
+        ("good 1.png", np.zeros((48, 64), np.uint16)),
+        ("larger.png", np.zeros((50, 64), np.uint16)),
+        ("brighter & so on.png", np.full((48, 64), 5000, np.uint16)),
+    ):
+        cv2.imwrite(str(tmp_path / name), picture)
+    tifffile.imwrite(tmp_path / "floats.tif", np.zeros((2, 48, 64)), photometric="minisblack")
+    (tmp_path / "cut.png").write_bytes((tmp_path / "brighter & so on.png").read_bytes()[:90])
+    good, *wrong = (
+        client.upload(tmp_path / name)
+        for name in ("good 1.png", "larger.png", "brighter & so on.png", "floats.tif")
+    )
+    assert good.name == "good 1.png"
+    for one, words in zip(
+        wrong,
+        (
+            "larger.png has 64 x 50 px, the first picture 64 x 48",
+            "brighter & so on.png holds 5000 counts; 12 bits",
+            "floats.tif, page 1 holds float64 of shape",
+        ),
+        strict=True,
+    ):
+        with pytest.raises(ServiceError, match=f"^{words}"):
+            client.import_captures(made, {"flow": [good.upload, one.upload]}, bits=12)
+    with pytest.raises(ServiceError, match=r"^cut\.png: The file cannot be read"):
+        client.upload(tmp_path / "cut.png")
+    (taken,) = client.import_captures(made, {"flow": [good.upload]})
+    kept = load_capture(live.app.state.services.folders.folder(made) / "captures" / taken.capture)
+    assert [one["name"] for one in kept.manifest["origin"]["files"]] == ["good 1.png"]
+
+
+def test_a_picture_that_was_sent_without_a_name_is_named_as_the_service_does(
+    client: Client, live: Live, tmp_path: Path
+):
+    made = client.create_experiment(camera_px=64).experiment
+    floats = tmp_path / "floats.tif"
+    tifffile.imwrite(floats, np.zeros((48, 64)))
+    with live.client() as asking:
+        octets = {"Content-Type": "application/octet-stream"}
+        upload = asking.post("/api/uploads", content=floats.read_bytes(), headers=octets).json()["upload"]
+    with pytest.raises(ServiceError, match=f"^{upload} holds float64"):
+        client.import_captures(made, {"flow": [upload]})
 
 
 def test_pictures_of_a_wrong_size_are_refused_with_both_sizes_and_jpeg_is_said_to_cost(
