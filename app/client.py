@@ -381,7 +381,10 @@ class Client:
         `view` is the camera that took them, by its name. Of several views a capture waits for those that it names as
         `missing`; `import_views` brings all of them together.
         """
-        return self._import(experiment, [(view, pictures)], bits, ambient_temperature_k)
+        given = _taken_by(view, pictures)
+        body = {"pictures": given, "bits": bits, "ambient_temperature_k": ambient_temperature_k}
+        path = f"/experiments/{experiment}/captures/imported"
+        return self._ask(list[CaptureResource], "POST", path, body)
 
     def import_views(
         self,
@@ -391,20 +394,7 @@ class Client:
         ambient_temperature_k: float | None = None,
     ) -> list[CaptureResource]:
         """Make captures of uploaded pictures of several cameras in one request: those of each view, by its name."""
-        return self._import(experiment, list(views.items()), bits, ambient_temperature_k)
-
-    def _import(
-        self,
-        experiment: str,
-        views: Sequence[tuple[str | None, Mapping[Role, Sequence[str]]]],
-        bits: int | None,
-        ambient_temperature_k: float | None,
-    ) -> list[CaptureResource]:
-        given = [
-            {"role": role, "view": view, "uploads": list(uploads)}
-            for view, pictures in views
-            for role, uploads in pictures.items()
-        ]
+        given = [one for view, pictures in views.items() for one in _taken_by(view, pictures)]
         body = {"pictures": given, "bits": bits, "ambient_temperature_k": ambient_temperature_k}
         path = f"/experiments/{experiment}/captures/imported"
         return self._ask(list[CaptureResource], "POST", path, body)
@@ -667,6 +657,10 @@ class Client:
 
 def _of_camera(step: StepText, view: str | None) -> dict[str, str]:
     return {"step": step} if view is None else {"step": step, "camera": view}
+
+
+def _taken_by(view: str | None, pictures: Mapping[Role, Sequence[str]]) -> list[dict[str, Any]]:
+    return [{"role": role, "view": view, "uploads": list(uploads)} for role, uploads in pictures.items()]
 
 
 def _read(kind: type[T], answer: httpx.Response) -> T:
