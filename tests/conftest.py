@@ -1,5 +1,7 @@
 """Strict JAX for every test: ranks and dtypes never promote silently. Options name real devices."""
 
+import signal
+
 import jax
 
 from tests.extremes.summary import pytest_runtest_logreport, pytest_terminal_summary
@@ -16,6 +18,10 @@ __all__ = [
 
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+# A shell that runs the tests in the background has them ignore Ctrl-C, and every program that they start as well.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser):
