@@ -19,7 +19,7 @@ __all__ = [
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 
-# A shell that runs the tests in the background has them ignore Ctrl-C, and every program that they start as well.
+# A shell that runs tests in the background makes them, and every program that they start, ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
