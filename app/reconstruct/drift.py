@@ -1,8 +1,9 @@
 """The camera's motion between two exposures: read off what is still, and what stays unknown of it.
 
 Marks that somebody drew, or a part of the picture beyond the back wall, are still if they move like a rigid picture:
-the camera's motion is read off them. Where there is none, or air of the room is before them too, the motion stays in
-the shifts, with the mount's stability as its prior. The solvers then marginalise it (`core.motion`).
+the camera's motion is read off them. What such a motion leaves of them says how far they are believed. Where there is
+none, or they moved otherwise, the motion stays in the shifts, with the mount's stability as its prior. The solvers
+marginalise what is unknown of it (`core.motion`).
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from app.reconstruct.yardstick import (
     Trusted,
     Yardstick,
     aligned,
+    is_noise,
     read_motion,
     trusted,
 )
@@ -107,7 +109,9 @@ def without_known_drift(
     if still.read is not None:
         return _known(exposures, still.read, said, f"the {_listed(still.names)}")
     read = read_motion(exposures, border, prior)
-    if read is not None and read.is_rigid:
+    if read is not None and is_noise(read.unlike, read.windows):
+        if not read.is_rigid:
+            said += f"The border of the picture may not be still: {read.what_is_left}. "
         return _known(exposures, read, said, "the border")
     shift, drift_px = aligned(exposures, in_room, prior)
     back_px = motion_basis(shift.centres_px, exposures.optics) @ (drift_px - prior.mean_px)
@@ -117,12 +121,13 @@ def without_known_drift(
 
 
 def _known(exposures: Exposures, read: Rigid, said: str, source: str) -> tuple[ShiftMeasurement, Motion, str]:
-    motion = CameraMotion(exposures.optics, max(1.0, read.unlike) ** 0.5 * read.root_px)
+    motion = CameraMotion(exposures.optics, read.root_px)
     told = _moved(_of_middle(read.motion_px, exposures.optics), read.motion_px)
+    unknown_px = float(np.sqrt(np.mean(np.sum(motion.at(read.shift.centres_px) ** 2, axis=(1, 2)))))
     return (
         replace(read.shift, motion=motion),
         read.motion_px,
-        f"{said}Drift between the exposures, from {source}: {told}; removed.",
+        f"{said}Drift between the exposures, from {source}: {told}; removed, and known to {unknown_px:.2g} px.",
     )
 
 

@@ -26,8 +26,12 @@ _PASSES = 3
 # What a rigid motion leaves of still parts has a mean square of 1 over its noise, which the noise model may have
 # wrong by this factor; chance adds at most so many standard deviations (one still border in 30,000 is refused).
 _NOISE_FACTOR, _SIGMAS = 1.3, 4.0
-# What air does to a border is smooth: a polynomial of this degree along both. One still border in so many is refused.
+# What air does to a border is smooth: a polynomial of this degree along both. One still border in so many is said to
+# have air before it.
 _SMOOTH, _LEAST_CHANCE = 4, 1e-4
+# What is smooth and like no motion tells how much may be smooth and like one: of each motion at most so many times as
+# much, before nine borders of five rooms at 4 and 30.5 m (README of tests/benchmarks).
+_HIDDEN = 2.0
 # Fewer windows than this say nothing of a rigid motion: in all, and in one of several parts.
 _LEAST_WINDOWS, _LEAST_IN_PART = 12, 4
 # A window that knows its shift no better than to a pixel shows nothing: a bare wall is of such windows.
@@ -82,13 +86,15 @@ class Rigid:
 
     `shift` is that of all windows without the motion. The columns of `root_px` are what stays unknown of it, in
     motions of one standard deviation; `unlike` is the mean square, over its noise, of what the motion leaves of the
-    windows that were asked, and `by_chance` how likely noise alone would leave so much that is alike in neighbours.
+    windows that were asked. `alike_px` is how large (rms) a part of that is alike in neighbours, and never less than
+    noise may hide; `by_chance` is how likely noise alone would leave so much of it.
     """
 
     shift: ShiftMeasurement
     motion_px: Motion
     root_px: Float[np.ndarray, "6 6"]
     unlike: float
+    alike_px: float
     by_chance: float
     windows: int
 
@@ -101,7 +107,8 @@ class Rigid:
     def what_is_left(self) -> str:
         """What the motion leaves, in words."""
         if is_noise(self.unlike, self.windows):
-            return "what a rigid motion leaves moves neighbouring windows alike, as air does"
+            alike_px = f"{self.alike_px:.2g} px"
+            return f"what a rigid motion leaves moves neighbouring windows alike by {alike_px}, as air does"
         return f"what a rigid motion leaves is {self.unlike**0.5:.1f} times its noise"
 
 
@@ -119,27 +126,49 @@ def _fitted(
 ) -> Rigid:
     """What some windows tell of the rest of a motion, when so much of it is taken out of the shifts."""
     good = good_windows(shift, windows)
-    rest_px, covariance = fit_motion(shift, good, optics, prior.mean_px - taken_px, prior.std_px)
-    left_px = shift.displacement_px - motion_basis(shift.centres_px, optics) @ rest_px
+    basis = motion_basis(shift.centres_px, optics)
+    expected_px = prior.mean_px - taken_px
+    rest_px, covariance = fit_motion(shift, good, optics, expected_px, prior.std_px)
+    left_px = shift.displacement_px - basis @ rest_px
     squares = np.einsum("wa,wab,wb->w", left_px, shift.information_per_px2, left_px)[good]
     fitted = MOTIONS - np.trace(covariance) / prior.std_px**2
-    values, vectors = np.linalg.eigh(covariance)
+    unlike = float(squares.sum() / max(2 * good.sum() - fitted, 1.0))
+    alike_px, by_chance = _alike(shift, left_px, good, optics)
+    kept, root_px = _believed(covariance, prior.std_px, max(1.0, unlike), _HIDDEN * alike_px)
+    rest_px = expected_px + kept @ (rest_px - expected_px)
     return Rigid(
-        replace(shift, displacement_px=left_px),
+        replace(shift, displacement_px=shift.displacement_px - basis @ rest_px),
         taken_px + rest_px,
-        vectors * np.sqrt(np.maximum(values, 0.0)),
-        float(squares.sum() / max(2 * good.sum() - fitted, 1.0)),
-        _by_chance(shift, left_px, good, optics),
+        root_px,
+        unlike,
+        alike_px,
+        by_chance,
         int(good.sum()),
     )
 
 
-def _by_chance(
-    shift: ShiftMeasurement, left_px: Float[np.ndarray, "windows 2"], good: Mask, optics: Optics
-) -> float:
-    """How likely white noise would leave so much of some windows that is smooth: an F test.
+def _believed(
+    covariance: Float[np.ndarray, "6 6"], prior_px: float, unlike: float, hidden_px: float
+) -> tuple[Float[np.ndarray, "6 6"], Float[np.ndarray, "6 6"]]:
+    """What is kept of a fitted motion, and a root of its covariance, if the windows err by more than their noise.
 
-    Air moves neighbours alike, noise each by itself. How large the noise is does not matter.
+    `covariance` is that of the fit with the prior. The noise's variance is `unlike` times as large, and what moves
+    the windows as the camera would adds the variance `hidden_px`^2 to each motion.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    told = np.maximum(1.0 / values - prior_px**-2, 0.0)
+    believed = 1.0 / (unlike / np.maximum(told, 1e-30) + hidden_px**2)
+    variance = 1.0 / (believed + prior_px**-2)
+    kept = variance * believed / np.maximum(values * told, 1e-30)
+    return (vectors * kept) @ vectors.T, vectors * np.sqrt(variance)
+
+
+def _alike(
+    shift: ShiftMeasurement, left_px: Float[np.ndarray, "windows 2"], good: Mask, optics: Optics
+) -> tuple[float, float]:
+    """How large the smooth part of some windows' shifts is [px], and how likely white noise would leave so much.
+
+    Air moves neighbours alike, noise each by itself. How large the noise is does not matter: an F test.
     """
     root = np.linalg.cholesky(shift.information_per_px2[good]).transpose(0, 2, 1)
     left = np.einsum("wab,wb->wa", root, left_px[good]).ravel()
@@ -148,7 +177,7 @@ def _by_chance(
     while powers and 2 * _smooth_count(powers) > free // 2:
         powers -= 1
     if powers < 2:
-        return 1.0
+        return 0.0, 1.0
     x, y = (2.0 * shift.centres_px[good] / (optics.width_px, optics.height_px) - 1.0).T
     terms = np.stack([x**i * y**j for i in range(powers + 1) for j in range(powers + 1 - i)], axis=-1)
     smooth = np.einsum("wt,ab->watb", terms, np.eye(2)).reshape(len(terms), 2, -1)
@@ -157,8 +186,11 @@ def _by_chance(
     by_motion, few = _explained(left, weighted[0])
     rest, count, free = float(left @ left) - with_smooth, rank - few, left.size - rank
     if count < 1 or free < 1 or rest <= 0.0:
-        return 1.0
-    return float(special.fdtrc(count, free, (with_smooth - by_motion) / count / (rest / free)))
+        return 0.0, 1.0
+    noise, found = rest / free, with_smooth - by_motion
+    beyond = max(found - count * noise, (2.0 * count) ** 0.5 * noise)
+    per_px2 = np.trace(shift.information_per_px2[good], axis1=1, axis2=2).sum()
+    return float(np.sqrt(beyond / per_px2)), float(special.fdtrc(count, free, found / count / noise))
 
 
 def _explained(

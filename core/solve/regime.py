@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from core.continuity import moved_as_air
+from core.continuity import left_out, moved_as_air
 from core.data_error import WALL_MARGIN
 from core.drift import nearly_still
 from core.losses.boundary_loss import boundary_loss, level_loss, point_losses
@@ -184,11 +184,21 @@ def _kept_windows(
     """Windows that the grid can represent, the representation error in px, and what units of motion do to them."""
     shift = nearly_still(problem.shifts[view])
     used, model_std_px = _usable(shift, data)
-    through_air = away_from_walls(problem.scene, view, shift.centres_px, 0.0)
-    used &= moved_as_air(problem.shifts[view], through_air)
+    used &= _as_air(problem, view)
     used = _away_from_walls(problem.scene, view, shift.centres_px, data.margin, used)
     kept = shift.at(used)
     return kept, model_std_px, _motion_of(problem, view).at(kept.centres_px)
+
+
+def _as_air(problem: Problem, view: int) -> Bool[np.ndarray, " windows"]:
+    shift = problem.shifts[view]
+    return moved_as_air(shift, away_from_walls(problem.scene, view, shift.centres_px, 0.0))
+
+
+def windows_left_out(problem: Problem, regime: Regime) -> tuple[str, ...]:
+    """A sentence on the windows that did not move as air does; none without any, or where no images are used."""
+    views = () if regime == "pde+boundary" else range(len(problem.shifts))
+    return left_out([_as_air(problem, view) for view in views])
 
 
 def _usable(shift: ShiftMeasurement, data: DataModel) -> tuple[np.ndarray, float]:

@@ -99,6 +99,8 @@ def row(asked: argparse.Namespace, truth: Path, seed: int, walls: tuple[WallName
         "u_within": scores["u_within"],
         "solver_s": round(scores["solver_s"], 1),
         "wall_s": round(done.wall_s, 1),
+        "outcome": scores["outcome"],
+        "notes": [*done.measurement.notes, *done.solution.notes],
     }
 
 

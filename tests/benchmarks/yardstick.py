@@ -48,8 +48,8 @@ def judged(truth: Path, border: Border, seed: int, camera_px: int, frames: int) 
         "camera_px": camera_px,
         "frames": frames,
         "drift_px": camera.drift_px,
-        "taken_as_still": "from the border" in note,
-        "refused": "border of the picture is not still" in note,
+        "taken_as_still": "from the border" in note and "not be still" not in note,
+        "refused": "not still" in note or "not be still" in note,
         "note": note,
     }
 

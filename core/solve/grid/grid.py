@@ -27,7 +27,7 @@ from core.solve.check import check_problem
 from core.solve.grid.gauss_newton import NewtonStep, column_scale, gauss_newton_step
 from core.solve.grid.start import starting_flow
 from core.solve.nondimensional import RoomFrame, frame_of
-from core.solve.regime import DataModel, Regime, Weights, losses_of, moved
+from core.solve.regime import DataModel, Regime, Weights, losses_of, moved, windows_left_out
 from core.solve.solution import solution_of
 from core.watch import Row, StoppedError, Store, Watch
 
@@ -109,7 +109,8 @@ def solve_grid(
         keeper.save(state, history, final=True)
         state = _at_start(Unknowns(_multigrid(state.unknowns).refined(), state.unknowns.drift), settings)
     shape = _cubic(settings.cells + 1)
-    return solution_of(state.unknowns, frame, shape, outcome, clock.elapsed_s, history)
+    notes = windows_left_out(problem, settings.regime)
+    return solution_of(state.unknowns, frame, shape, outcome, clock.elapsed_s, history, notes)
 
 
 def initial_unknowns(problem: Problem, frame: RoomFrame, settings: GridSettings) -> Unknowns:

@@ -28,7 +28,7 @@ from core.solve.check import check_problem
 from core.solve.loop import LoopSettings, run
 from core.solve.network.mlp_start import network_like
 from core.solve.nondimensional import frame_of
-from core.solve.regime import DataModel, Regime, Weights, losses_of, moved
+from core.solve.regime import DataModel, Regime, Weights, losses_of, moved, windows_left_out
 from core.solve.solution import solution_of
 from core.watch import Watch
 
@@ -112,6 +112,7 @@ def solve_mlp(
     notes = (
         f"{settings.network.hidden_layers} x {settings.network.width} {settings.network.activation} network; "
         f"a step needs {found.memory_bytes / 1e6:.0f} MB; compiled in {found.compile_s:.1f} s.",
+        *windows_left_out(problem, settings.regime),
     )
     prepared_s = time.perf_counter() - began - found.compile_s
     return solution_of(found.best, frame, (r, r, r), found.outcome, prepared_s, found.history, notes)

@@ -67,6 +67,31 @@ def test_a_still_border_gives_the_creep_and_one_behind_air_is_refused():
         np.testing.assert_allclose(shift.motion.root_px, np.eye(6))
 
 
+def a_little_air_everywhere(size_px):
+    """Smooth, as the air of a room is: what it does to the picture is in part like a motion of the camera."""
+
+    def air_px(x, y):
+        return size_px * (0.5 + np.cos(4 * x - 2 * y)), size_px * (np.sin(3 * y) - np.cos(3 * x + 2 * y))
+
+    return air_px
+
+
+def test_a_border_with_air_before_it_is_believed_as_far_as_what_it_leaves_says():
+    basis, known_px = motion_basis(CENTRES, LENS), []
+    for size_px in (0.0, 0.002, 0.004):
+        off_px, said_px = [], []
+        for seed in range(4):
+            shift, drift_px, note = drift_of(exposures(seed, a_little_air_everywhere(size_px)))
+            assert "from the border" in note
+            assert shift.motion is not None
+            off_px.append(basis @ (drift_px - CREEP_PX))
+            said_px.append(np.linalg.norm(shift.motion.at(CENTRES), axis=2))
+        assert np.mean(np.square(off_px)) < 2.0 * np.mean(np.square(said_px))
+        known_px.append(np.sqrt(np.mean(np.square(said_px))))
+    assert known_px[0] < 0.005
+    assert known_px[0] < known_px[1] < known_px[2] < 0.1
+
+
 def test_a_bare_border_says_nothing_and_the_creep_stays_in_the_shifts():
     shift, _, note = drift_of(exposures(1, still_air, textured=False))
     assert "No part of the picture" in note
