@@ -83,6 +83,6 @@ def _told(good: Bool[np.ndarray, " windows"]) -> str:
     if good.all():
         return ""
     return (
-        f" {100 * float(1.0 - good.mean()):.1f} % of the windows show something else than the pattern, moved, in one "
+        f" {100 * float(1.0 - good.mean()):.3g} % of the windows show something else than the pattern, moved, in one "
         "of the bursts (somebody who walked by), and are left out of all of them."
     )

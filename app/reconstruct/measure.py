@@ -225,7 +225,7 @@ def _in_room(
     if shift.refused is not None and np.any(shift.refused):
         refused = float(shift.refused.mean())
         note += (
-            f" {100 * refused:.1f} % of the windows show something else than the pattern, moved, in one of the "
+            f" {100 * refused:.3g} % of the windows show something else than the pattern, moved, in one of the "
             "pictures (a person, a reflection, another light), and are left out."
         )
     return shift.good(), drift_px, note
