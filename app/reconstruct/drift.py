@@ -20,7 +20,7 @@ from app.reconstruct.yardstick import (
     Trusted,
     Yardstick,
     aligned,
-    is_noise,
+    believed,
     read_motion,
     trusted,
 )
@@ -31,8 +31,9 @@ from core.problem import ShiftMeasurement
 
 # A motion is never known better than this.
 _LEAST_PX = 1e-4
-
-
+# Air moves the picture by hundredths of a pixel: a border that tells the motion to more than that (of a mount that is
+# stable to a pixel, so much) is of no use.
+_TELLS = 0.05
 # Two references tell a motion of any size.
 _UNBOUND_PX = 100.0
 
@@ -109,10 +110,11 @@ def without_known_drift(
     if still.read is not None:
         return _known(exposures, still.read, said, f"the {_listed(still.names)}")
     read = read_motion(exposures, border, prior)
-    if read is not None and is_noise(read.unlike, read.windows):
-        if not read.is_rigid:
-            said += f"The border of the picture may not be still: {read.what_is_left}. "
-        return _known(exposures, read, said, "the border")
+    told = None if read is None else believed(read, prior, exposures.optics)
+    if told is not None and _unknown_px(told, exposures) < _TELLS * prior.std_px:
+        if not told.is_rigid:
+            said += f"The border of the picture may not be still: {told.what_is_left}. "
+        return _known(exposures, told, said, "the border")
     shift, drift_px = aligned(exposures, in_room, prior)
     back_px = motion_basis(shift.centres_px, exposures.optics) @ (drift_px - prior.mean_px)
     motion = CameraMotion(exposures.optics, prior.std_px * np.eye(MOTIONS))
@@ -121,14 +123,19 @@ def without_known_drift(
 
 
 def _known(exposures: Exposures, read: Rigid, said: str, source: str) -> tuple[ShiftMeasurement, Motion, str]:
-    motion = CameraMotion(exposures.optics, read.root_px)
     told = _moved(_of_middle(read.motion_px, exposures.optics), read.motion_px)
-    unknown_px = float(np.sqrt(np.mean(np.sum(motion.at(read.shift.centres_px) ** 2, axis=(1, 2)))))
     return (
-        replace(read.shift, motion=motion),
+        replace(read.shift, motion=CameraMotion(exposures.optics, read.root_px)),
         read.motion_px,
-        f"{said}Drift between the exposures, from {source}: {told}; removed, and known to {unknown_px:.2g} px.",
+        f"{said}Drift between the exposures, from {source}: {told}; removed, and known to "
+        f"{_unknown_px(read, exposures):.2g} px.",
     )
+
+
+def _unknown_px(read: Rigid, exposures: Exposures) -> float:
+    """How far what stays unknown of a motion moves the picture's windows (rms)."""
+    motions = CameraMotion(exposures.optics, read.root_px).at(read.shift.centres_px)
+    return float(np.sqrt(np.mean(np.sum(motions**2, axis=(1, 2)))))
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -153,9 +160,7 @@ def _moved(middle_px: Float[np.ndarray, " 2"], motion_px: Motion) -> str:
 def _unknown(middle_px: Float[np.ndarray, " 2"], prior: MotionPrior, border: Rigid | None) -> str:
     why = "No part of the picture is free of the room's air."
     if border is not None:
-        why = (
-            f"The border of the picture is not still: {border.what_is_left}, so the room's air is before it."
-        )
+        why = f"The border of the picture is not still: {border.what_is_left}; the room's air is before it."
     return (
         f"{why} The middle of the picture moved by {middle_px[0]:+.3f} px across, {middle_px[1]:+.3f} px down. How "
         f"much of that is the camera is not known exactly ({prior.source}), and is estimated together with the air."

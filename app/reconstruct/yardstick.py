@@ -126,41 +126,42 @@ def _fitted(
 ) -> Rigid:
     """What some windows tell of the rest of a motion, when so much of it is taken out of the shifts."""
     good = good_windows(shift, windows)
-    basis = motion_basis(shift.centres_px, optics)
-    expected_px = prior.mean_px - taken_px
-    rest_px, covariance = fit_motion(shift, good, optics, expected_px, prior.std_px)
-    left_px = shift.displacement_px - basis @ rest_px
+    rest_px, covariance = fit_motion(shift, good, optics, prior.mean_px - taken_px, prior.std_px)
+    left_px = shift.displacement_px - motion_basis(shift.centres_px, optics) @ rest_px
     squares = np.einsum("wa,wab,wb->w", left_px, shift.information_per_px2, left_px)[good]
     fitted = MOTIONS - np.trace(covariance) / prior.std_px**2
     unlike = float(squares.sum() / max(2 * good.sum() - fitted, 1.0))
-    alike_px, by_chance = _alike(shift, left_px, good, optics)
-    kept, root_px = _believed(covariance, prior.std_px, max(1.0, unlike), _HIDDEN * alike_px)
-    rest_px = expected_px + kept @ (rest_px - expected_px)
+    values, vectors = np.linalg.eigh(covariance)
     return Rigid(
-        replace(shift, displacement_px=shift.displacement_px - basis @ rest_px),
+        replace(shift, displacement_px=left_px),
         taken_px + rest_px,
-        root_px,
+        max(1.0, unlike) ** 0.5 * vectors * np.sqrt(np.maximum(values, 0.0)),
         unlike,
-        alike_px,
-        by_chance,
+        *_alike(shift, left_px, good, optics),
         int(good.sum()),
     )
 
 
-def _believed(
-    covariance: Float[np.ndarray, "6 6"], prior_px: float, unlike: float, hidden_px: float
-) -> tuple[Float[np.ndarray, "6 6"], Float[np.ndarray, "6 6"]]:
-    """What is kept of a fitted motion, and a root of its covariance, if the windows err by more than their noise.
+def believed(read: Rigid, prior: MotionPrior, optics: Optics) -> Rigid:
+    """What a border tells, whatever air is before it.
 
-    `covariance` is that of the fit with the prior. The noise's variance is `unlike` times as large, and what moves
-    the windows as the camera would adds the variance `hidden_px`^2 to each motion.
+    What of the air is smooth and moves the windows as the camera would adds to each motion the variance that
+    `alike_px` tells. Each motion goes back towards the prior as far as it is less certain now.
     """
-    values, vectors = np.linalg.eigh(covariance)
-    told = np.maximum(1.0 / values - prior_px**-2, 0.0)
-    believed = 1.0 / (unlike / np.maximum(told, 1e-30) + hidden_px**2)
-    variance = 1.0 / (believed + prior_px**-2)
-    kept = variance * believed / np.maximum(values * told, 1e-30)
-    return (vectors * kept) @ vectors.T, vectors * np.sqrt(variance)
+    vectors, size_px, _ = np.linalg.svd(read.root_px)
+    told = np.maximum(size_px**-2 - prior.std_px**-2, 0.0)
+    less = told / (1.0 + told * (_HIDDEN * read.alike_px) ** 2)
+    variance = 1.0 / (less + prior.std_px**-2)
+    kept = np.divide(variance * less, size_px**2 * told, out=np.zeros(MOTIONS), where=told > 0)
+    back_px = (vectors * (1.0 - kept)) @ vectors.T @ (read.motion_px - prior.mean_px)
+    shift = read.shift
+    moved_px = shift.displacement_px + motion_basis(shift.centres_px, optics) @ back_px
+    return replace(
+        read,
+        shift=replace(shift, displacement_px=moved_px),
+        motion_px=read.motion_px - back_px,
+        root_px=vectors * np.sqrt(variance),
+    )
 
 
 def _alike(

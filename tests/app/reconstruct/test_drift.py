@@ -50,7 +50,7 @@ def drift_of(pictures):
     return without_known_drift(pictures, ~BEYOND, BEYOND, mount(1.0))
 
 
-def test_a_still_border_gives_the_creep_and_one_behind_air_is_refused():
+def test_a_still_border_gives_the_creep():
     basis = motion_basis(CENTRES, LENS)
     for seed in range(6):
         shift, drift_px, note = drift_of(exposures(seed, still_air))
@@ -59,12 +59,6 @@ def test_a_still_border_gives_the_creep_and_one_behind_air_is_refused():
         np.testing.assert_allclose(basis @ drift_px, basis @ CREEP_PX, atol=6e-3)
         assert shift.motion is not None
         assert 1e-5 < np.linalg.norm(shift.motion.at(CENTRES), axis=(1, 2)).max() < 0.01
-
-        shift, drift_px, note = drift_of(exposures(seed, air_everywhere))
-        assert "not still" in note
-        assert not drift_px.any()
-        assert shift.motion is not None
-        np.testing.assert_allclose(shift.motion.root_px, np.eye(6))
 
 
 def a_little_air_everywhere(size_px):
@@ -78,7 +72,7 @@ def a_little_air_everywhere(size_px):
 
 def test_a_border_with_air_before_it_is_believed_as_far_as_what_it_leaves_says():
     basis, known_px = motion_basis(CENTRES, LENS), []
-    for size_px in (0.0, 0.002, 0.004):
+    for size_px in (0.0, 0.002, 0.02):
         off_px, said_px = [], []
         for seed in range(4):
             shift, drift_px, note = drift_of(exposures(seed, a_little_air_everywhere(size_px)))
@@ -86,10 +80,31 @@ def test_a_border_with_air_before_it_is_believed_as_far_as_what_it_leaves_says()
             assert shift.motion is not None
             off_px.append(basis @ (drift_px - CREEP_PX))
             said_px.append(np.linalg.norm(shift.motion.at(CENTRES), axis=2))
-        assert np.mean(np.square(off_px)) < 2.0 * np.mean(np.square(said_px))
+        assert np.mean(np.square(off_px)) < np.mean(np.square(said_px))
         known_px.append(np.sqrt(np.mean(np.square(said_px))))
+    assert "may not be still" in note
     assert known_px[0] < 0.005
-    assert known_px[0] < known_px[1] < known_px[2] < 0.1
+    assert known_px == sorted(known_px)
+
+
+def test_a_border_that_air_moves_as_far_as_the_mount_may_leaves_the_creep_unknown():
+    shift, drift_px, note = drift_of(
+        exposures(1, lambda x, y: tuple(20.0 * px for px in air_everywhere(x, y)))
+    )
+    assert "is not still" in note
+    assert not drift_px.any()
+    assert shift.motion is not None
+    np.testing.assert_allclose(shift.motion.root_px, np.eye(6))
+
+
+def test_things_that_move_before_a_part_of_the_border_do_not_tell_its_motion():
+    def moved(x, y):
+        return 3.0 * (x < 0.2) * np.sin(40 * y), 3.0 * (y > 0.8) * np.cos(40 * x)
+
+    _, drift_px, note = drift_of(exposures(1, moved))
+    assert "from the border" in note
+    basis = motion_basis(CENTRES, LENS)
+    np.testing.assert_allclose(basis @ drift_px, basis @ CREEP_PX, atol=0.02)
 
 
 def test_a_bare_border_says_nothing_and_the_creep_stays_in_the_shifts():
