@@ -7,10 +7,11 @@ import jax
 from tests.extremes.summary import pytest_runtest_logreport, pytest_terminal_summary
 from tests.memory import compiled_programs, pytest_configure
 from tests.shapes import check_each_once
-from tests.workers import pytest_xdist_make_scheduler
+from tests.workers import pytest_collection_modifyitems, pytest_xdist_make_scheduler
 
 __all__ = [
     "compiled_programs",
+    "pytest_collection_modifyitems",
     "pytest_configure",
     "pytest_runtest_logreport",
     "pytest_terminal_summary",
