@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32, UInt8
-from scipy.ndimage import affine_transform, spline_filter
+from scipy.ndimage import spline_filter
+from scipy.sparse import csr_array
 
 from app.errors import BadInputError
 from app.experiment.folder import Experiment, open_experiment, save_settings
@@ -90,10 +91,26 @@ class PrintPattern:
         offset = [
             (one.start + 0.5) / self.fine - 0.5 - mine.start for one, mine in zip(wanted, own, strict=True)
         ]
-        shape = tuple(one.stop - one.start for one in wanted)
-        scale = [1 / self.fine] * 2
-        # SciPy's types know one offset for all axes only; it takes one an axis.
-        return affine_transform(knots, scale, offset, shape, order=3, mode="mirror", prefilter=False)  # type: ignore[arg-type]
+        down, across = (
+            _cubic(place + np.arange(one.stop - one.start) / self.fine, count)
+            for place, one, count in zip(offset, wanted, knots.shape, strict=True)
+        )
+        # One axis after the other: eight products a pixel, by both at once sixteen, and slower ones.
+        return (across @ (down @ knots).T).T
+
+
+def _cubic(places: np.ndarray, count: int) -> csr_array:
+    """Cubic B-splines' values at places among so many knots, mirrored at both ends: a row a place."""
+    first = np.floor(places).astype(int) - 1
+    near = first[:, None] + np.arange(4)
+    t = (places - first - 1)[:, None]
+    weights = np.concatenate(
+        [(1 - t) ** 3, 4 - 6 * t**2 + 3 * t**3, 1 + 3 * t + 3 * t**2 - 3 * t**3, t**3], axis=1
+    )
+    last = count - 1
+    mirrored = last - np.abs(last - np.abs(near))
+    rows = np.arange(0, 4 * len(places) + 1, 4)
+    return csr_array((weights.ravel() / 6, mirrored.ravel(), rows), shape=(len(places), count))
 
 
 def choose_pattern(folder: Path, view: str | None = None) -> Experiment:
