@@ -6,16 +6,19 @@ import jax
 
 from tests.extremes.summary import pytest_runtest_logreport, pytest_terminal_summary
 from tests.memory import compiled_programs, pytest_configure
-from tests.workers import pytest_xdist_make_scheduler
+from tests.shapes import check_each_once
+from tests.workers import pytest_collection_modifyitems, pytest_xdist_make_scheduler
 
 __all__ = [
     "compiled_programs",
+    "pytest_collection_modifyitems",
     "pytest_configure",
     "pytest_runtest_logreport",
     "pytest_terminal_summary",
     "pytest_xdist_make_scheduler",
 ]
 
+check_each_once()
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 

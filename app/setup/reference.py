@@ -14,6 +14,7 @@ import types
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from pydantic import BaseModel, TypeAdapter
@@ -221,6 +222,7 @@ def _row(kind: Any, name: str, hint: Any, found: Mapping[tuple[Any, str], Any]) 
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
+@cache
 def meanings(kind: Any) -> dict[str, str]:
     """What the text below each field says."""
     schema = TypeAdapter(kind).json_schema()

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32, UInt8
-from scipy.ndimage import affine_transform, spline_filter
+from scipy.interpolate import BSpline
+from scipy.ndimage import spline_filter
 
 from app.errors import BadInputError
 from app.experiment.folder import Experiment, open_experiment, save_settings
@@ -85,15 +86,18 @@ class PrintPattern:
                 for one, mine in zip(wanted, own, strict=True)
             )
             return values[first, second]
-        knots = spline_filter(values, order=3, mode="mirror")
+        weights = np.pad(spline_filter(values, order=3, mode="mirror"), 2, mode="reflect")
         # The middle of print pixel i lies at (i + 0.5) / fine - 0.5 pattern pixels.
-        offset = [
-            (one.start + 0.5) / self.fine - 0.5 - mine.start for one, mine in zip(wanted, own, strict=True)
-        ]
-        shape = tuple(one.stop - one.start for one in wanted)
-        scale = [1 / self.fine] * 2
-        # SciPy's types know one offset for all axes only; it takes one an axis.
-        return affine_transform(knots, scale, offset, shape, order=3, mode="mirror", prefilter=False)  # type: ignore[arg-type]
+        places = (
+            (np.arange(one.start, one.stop) + 0.5) / self.fine - 0.5 - mine.start
+            for one, mine in zip(wanted, own, strict=True)
+        )
+        # One axis after the other: eight products a pixel instead of sixteen.
+        down, across = (
+            BSpline.design_matrix(place, np.arange(count + 4.0) - 4.0, 3)
+            for place, count in zip(places, weights.shape, strict=True)
+        )
+        return (across @ (down @ weights).T).T
 
 
 def choose_pattern(folder: Path, view: str | None = None) -> Experiment:

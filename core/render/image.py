@@ -41,9 +41,9 @@ def _render(scene: Scene, view: int, field: AbstractField | None) -> Float32[np.
     rows = min(max(1, _PIXELS_A_BLOCK // camera.width_px), camera.height_px)
     image = np.zeros((camera.height_px, camera.width_px), np.float32)
     for first in range(0, camera.height_px, rows):
-        geometry = pixel_geometry(scene, view, _raster(first, rows, camera.width_px, 1))
+        geometry = pixel_geometry(scene, view, _filled(_raster(first, rows, camera.width_px, 1)))
         exposure = Exposure(geometry, offsets[:, None], weights)
-        lit = np.zeros(rows * camera.width_px, np.float32)
+        lit = np.zeros(len(geometry.weight), np.float32)
         points = lens_points(choice)
         for point in points:
             motion = exposure.still
@@ -52,7 +52,8 @@ def _render(scene: Scene, view: int, field: AbstractField | None) -> Float32[np.
                     _motion(scene, view, field, choice, point, first, rows), motion.shape
                 )
             lit += np.asarray(_expose(exposure, pattern, motion)) / len(points)
-        image[first : first + rows] = lit.reshape(rows, -1)[: camera.height_px - first]
+        own = lit[: rows * camera.width_px].reshape(rows, -1)
+        image[first : first + rows] = own[: camera.height_px - first]
     return image
 
 
@@ -63,19 +64,31 @@ def _motion(
     """The pattern's motion of a block: from a ray a sample, or from rays every `stride` pixels."""
     width, stride = scene.views[view].camera.width_px, choice.stride
     if not stride:
-        pixels = _raster(first, rows, width, 1)
+        pixels = _filled(_raster(first, rows, width, 1))
         geometries = [pixel_geometry(scene, view, pixels + o, point) for o in quadrature(choice.samples)[0]]
         return jnp.stack([_traced(g, field, choice) for g in geometries])
     lattice = _raster(first, rows + 2 * stride - 1, width + 2 * stride - 1, stride)
-    geometry = pixel_geometry(scene, view, lattice, point)
+    geometry = pixel_geometry(scene, view, _filled(lattice), point)
     lattice_cols = len(np.arange(0, width + 2 * stride - 1, stride))
     motion = _traced(geometry, field, choice)
-    return _spread_motion(motion, geometry.weight > 0, (lattice_cols, stride, rows, width))[None]
+    layout = (len(lattice), lattice_cols, stride, rows, width)
+    return _spread_motion(motion, geometry.weight > 0, layout)[None]
 
 
 def _raster(first_row: int, rows: int, cols: int, stride: int) -> Float[np.ndarray, "pixels 2"]:
     row, column = np.mgrid[first_row : first_row + rows : stride, 0:cols:stride]
     return np.stack([column.ravel(), row.ravel()], axis=1).astype(float)
+
+
+def _filled(pixels: Float[np.ndarray, "pixels 2"]) -> Float[np.ndarray, "more 2"]:
+    """The last one again, up to a number that many blocks share: pictures of other sizes run the same programs."""
+    return np.pad(pixels, ((0, _shared(len(pixels)) - len(pixels)), (0, 0)), mode="edge")
+
+
+def _shared(count: int) -> int:
+    """The next power of two, or half as much again."""
+    power = 1 << (count - 1).bit_length()
+    return 3 * power // 4 if 4 * count <= 3 * power else power
 
 
 _traced = eqx.filter_jit(pattern_motion)
@@ -88,14 +101,15 @@ def _expose(exposure: Exposure, pattern: Array, motion: Array) -> Float[Array, "
 
 @eqx.filter_jit
 def _spread_motion(
-    motion: Float[Array, "lattice 3"], lit: Array, layout: tuple[int, int, int, int]
+    motion: Float[Array, "lattice 3"], lit: Array, layout: tuple[int, int, int, int, int]
 ) -> Float[Array, "pixels 3"]:
     """Bilinear between the rays of the lattice; rays that see no pattern are left out of the mean."""
-    cols, stride, rows, width = layout
+    count, cols, stride, rows, width = layout
     known = lit.astype(motion.dtype)[:, None]
-    values = jnp.concatenate([motion * known, known], axis=1).reshape(-1, cols, 4)
+    values = jnp.concatenate([motion * known, known], axis=1)[:count].reshape(-1, cols, 4)
     full = _spread(_spread(values, stride).swapaxes(0, 1), stride).swapaxes(0, 1)[:rows, :width]
-    return (full[..., :3] / jnp.maximum(full[..., 3:], 1e-6)).reshape(-1, 3)
+    own = (full[..., :3] / jnp.maximum(full[..., 3:], 1e-6)).reshape(-1, 3)
+    return jnp.pad(own, ((0, _shared(rows * width) - rows * width), (0, 0)))
 
 
 def _spread(values: Float[Array, "n m c"], stride: int) -> Float[Array, "fine m c"]:

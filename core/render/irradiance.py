@@ -1,5 +1,6 @@
 """The shadowgraph term: how refraction gathers or spreads the projector's light on the wall."""
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -32,8 +33,9 @@ def irradiance_factor(
         aimed: Rays = aim(projector, offset_m + probe_m[None], range_m)
         return tracer.bend(aimed, field).wall_shift_m
 
-    probes = _PROBE_M * jnp.eye(3, dtype=offset_m.dtype)
-    along_x, along_z = ((landing(probes[i]) - landing(-probes[i])) / (2 * _PROBE_M) for i in (0, 2))
+    probes_m = _PROBE_M * jnp.asarray([[1, 0, 0], [-1, 0, 0], [0, 0, 1], [0, 0, -1]], offset_m.dtype)
+    right, left, up, down = jax.lax.map(landing, probes_m)
+    along_x, along_z = (right - left) / (2 * _PROBE_M), (up - down) / (2 * _PROBE_M)
     # det(1 + D) - 1 first: near 1, a float32 has lost the digits of a small D.
     small = along_x[:, 0] + along_z[:, 2] + along_x[:, 0] * along_z[:, 2] - along_x[:, 2] * along_z[:, 0]
     return 1.0 / (1.0 + small)

@@ -7,6 +7,7 @@ share them, whichever rays carry the shift.
 """
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -33,12 +34,17 @@ class Exposure(eqx.Module):
         self, pattern: Float[Array, "rows cols"], motion: Float[Array, "samples pixels 3"]
     ) -> Float[Array, " pixels"]:
         """Filtered pattern; `motion` is the shift (column, row) [px] and the light's gain minus 1."""
-        total = jnp.zeros_like(self.geometry.weight)
-        for offset, weight, moved in zip(self.offsets_px, self.weights, motion, strict=True):
+
+        # One sample's program for all of them: it compiles in a fraction of the time.
+        def add(total: Array, sample: tuple[Array, Array, Array]) -> tuple[Array, None]:
+            offset, weight, moved = sample
             step_px = jnp.sum(self.geometry.pattern_from_pixel * offset[:, None, :], axis=-1)
             place_px = self.geometry.fraction_px + step_px + moved[:, :2]
             light = sample_pattern(pattern, self.geometry.cell, place_px)
-            total = total + weight * (1.0 + moved[:, 2]) * light
+            return total + weight * (1.0 + moved[:, 2]) * light, None
+
+        none = jnp.zeros_like(self.geometry.weight)
+        total, _ = jax.lax.scan(add, none, (self.offsets_px, self.weights, motion))
         return total * self.geometry.weight
 
     @property

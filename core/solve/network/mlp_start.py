@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from core.losses.representation import points_of
 from core.mlp import Mlp
@@ -61,7 +61,7 @@ def _fitted(
         values = jnp.concatenate([found.temperature[:, None], found.pressure[:, None], found.velocity], 1)
         return jnp.mean(((values - wanted[own]) / spread[None, :]) ** 2)
 
-    def step(carry: tuple[Mlp, optax.OptState], key: Array) -> tuple[tuple[Mlp, optax.OptState], None]:
+    def step(carry: tuple[Mlp, PyTree], key: Array) -> tuple[tuple[Mlp, PyTree], None]:
         arrays, state = carry
         change, state = optimiser.update(jax.grad(misfit)(arrays, key), state)
         return (eqx.apply_updates(arrays, change), state), None
