@@ -160,11 +160,6 @@ def looked_along(scene: Scene) -> tuple[int, ...]:
     return tuple(sorted({face_of(view.wall).axis for view in scene.views}))
 
 
-def seen_along(scene: Scene) -> tuple[int, ...]:
-    """The horizontal axes (0, 1) along which the views tell a place: those that not all of them look along."""
-    return tuple(axis for axis in (0, 1) if any(along != axis for along in looked_along(scene)))
-
-
 def _three(values: list[float]) -> tuple[float, float, float]:
     x, y, z = values
     return x, y, z

@@ -13,7 +13,6 @@ from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.scene import Driving, Heater, Inlet
-from core.view_frame import seen_along
 
 # One room in twenty has an entry called wrong that is as right as its stated deviation says.
 _FALSE_ALARMS = 0.05
@@ -62,8 +61,7 @@ def contradictions(
     for n, heater in enumerate(heaters):
         by_k = float(fitted.heater_excess_k[n] - prior.mean.heater_excess_k[n])
         if isinstance(heater, SuspectedHeater):
-            warmer_k = float(fitted.heater_excess_k[n]) - (leaving_excess_k(problem) or 0.0)
-            said += suspicion(heater, warmer_k, seen_along(problem.scene))
+            said += suspicion(heater, float(fitted.heater_excess_k[n]) - (leaving_excess_k(problem) or 0.0))
         elif (name := f"heater_excess_k[{n}]") in believed:
             where = f"the heater on {heater.patch.wall}"
             said.append(_warmer(where, by_k, heater.temperature_k, believed[name]))
@@ -109,38 +107,27 @@ def objects_heat(
     return said
 
 
-def suspicion(heater: SuspectedHeater, by_k: float, seen: tuple[int, ...]) -> list[str]:
-    """A sentence about a strip of floor that the fit made `by_k` warmer than the air; none if it is small.
-
-    `seen` are the axes along which the views tell its place.
-    """
+def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
+    """A sentence about a strip of floor that the fit made `by_k` warmer than the air; none if it is small."""
     if abs(by_k) < _SUSPICIOUS_K:
         return []
     lower, upper = heater.patch.lower_m, heater.patch.upper_m
     size = " x ".join(f"{high - low:.2f}" for low, high in zip(lower, upper, strict=True))
-    deep = (
-        "" if len(seen) > 1 else " One view does not tell how deep in the room it is; the middle was assumed."
-    )
     return [
         f"The images ask for {'heat' if by_k > 0 else 'cold'} that is not in the scene: as of a floor panel of "
-        f"{size} m, {abs(by_k):.0f} K {'warmer' if by_k > 0 else 'colder'} than the air, at "
-        f"{_place(heater, seen)}.{deep} State it as a heater."
+        f"{size} m, {abs(by_k):.0f} K {'warmer' if by_k > 0 else 'colder'} than the air, at x = {lower[0]:.1f} to "
+        f"{upper[0]:.1f} m. How deep in the room it is was not looked for; the middle was assumed. State it "
+        "as a heater."
     ]
 
 
-def missing_heat(strip: SuspectedHeater, likeness: float, seen: tuple[int, ...]) -> str:
+def missing_heat(strip: SuspectedHeater, likeness: float) -> str:
     """A sentence about a strip of floor where heat may be missing that the room's fit could not make use of."""
-    deep = "" if len(seen) > 1 else ", at any depth"
+    low, high = strip.patch.lower_m[0], strip.patch.upper_m[0]
     return (
-        f"Heat on the floor at {_place(strip, seen)} would change the pictures as what is left unexplained "
-        f"differs (correlation {likeness:.2f}). Look for a source that rises there{deep}, and state it."
+        f"Heat on the floor at x = {low:.1f} to {high:.1f} m would change the pictures as what is left unexplained "
+        f"differs (correlation {likeness:.2f}). Look for a source that rises there, at any depth, and state it."
     )
-
-
-def _place(heater: Heater, seen: tuple[int, ...]) -> str:
-    """Where a strip lies along the axes that the views tell."""
-    lower, upper = heater.patch.lower_m, heater.patch.upper_m
-    return ", ".join(f"{'xy'[axis]} = {lower[axis]:.1f} to {upper[axis]:.1f} m" for axis in seen)
 
 
 def misfit(data: Observations, seen: Explained, error: ModelError) -> list[str]:

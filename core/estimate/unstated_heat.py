@@ -1,16 +1,15 @@
 """A heat source that nobody stated: find the strip of floor that explains the images best.
 
 The coarse room is marched with a heated panel on each of five strips of floor in turn, and then on the two strips
-half-way to the neighbours of the best one. A view tells where across its line of sight the air rises and not how deep
-in the room, so the strips follow one another across it and lie in the middle of the room's depth. Where views tell
-both, strips along the other axis are tried at the place that was found. A panel is compared by what it would leave of
-the images' residual r if the change d that it makes could be scaled:
+half-way to the neighbours of the best one. A panel is compared by what it would leave of the images' residual r if
+the change d that it makes could be scaled:
 
     |r - a d|^2 / |r|^2 = 1 - c^2,    c = <r, d> / (|r| |d|),    a = <r, d> / |d|^2
 
 A plume beside its true place, or too strong, would make the misfit itself larger. Each panel is made warmer as long
-as the correlation c rises; a times its heat is what the images ask for. The best strip enters the fit as a heater
-with a prior deviation of half its heat, and so do its neighbours on both sides.
+as the correlation c rises; a times its heat is what the images ask for. One view shows where along x the air rises
+but not how deep in the room, so the strips lie in the middle of the room's depth. The best strip enters the fit as a
+heater with a prior deviation of half its heat, and so do its neighbours on both sides.
 """
 
 from collections.abc import Sequence
@@ -34,10 +33,9 @@ from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.room.forward import Room, room
 from core.scene import Heater, OnPatch, Patch
-from core.view_frame import seen_along
 
-# Strips along an axis. One is as deep, along the other, as one of these strips is long.
-_STRIPS = 5
+# Strips along x, and their depth along y as a share of the room's.
+_STRIPS, _DEPTH_SHARE = 5, 0.2
 # Temperatures above the air that are tried. At a heater's usual coefficient 20 K give some 60 W/m2 over about half a
 # square metre: the range is from a lamp to a radiator.
 _LADDER_K = (15.0, 30.0, 60.0, 120.0)
@@ -59,38 +57,27 @@ def likeliest(
     background: Background, data: Observations, settings: RoomSettings, marches: Marches
 ) -> Suspect | None:
     """The strip of floor whose heat explains the images best; None if none explains anything."""
-    problem, tried, best = background.problem, list[Suspect](), None
-    for axis in seen_along(problem.scene):
-        place = best and best.strip
-        tried += warmed_each(floor_strips(problem, axis, place), background, data, settings, marches)
-        best = max(tried, key=_likeness, default=None)
-        if best is None or best.likeness <= 0.0:
-            return None
-        # A panel may lie half on one strip and half on the next.
-        between = floor_strips(problem, axis, place, between=True)
-        halves = [strip for strip in between if share_area(strip.patch, best.strip.patch)]
-        tried += warmed_each(halves, background, data, settings, marches)
-        best = max(tried, key=_likeness)
-    if best is None:
+    strips = floor_strips(background.problem)
+    suspects = warmed_each(strips, background, data, settings, marches)
+    if max((suspect.likeness for suspect in suspects), default=0.0) <= 0.0:
         return None
+    best = max(suspects, key=lambda suspect: suspect.likeness)
+    # A panel may lie half on one strip and half on the next.
+    between = floor_strips(background.problem, between=True)
+    halves = [strip for strip in between if share_area(strip.patch, best.strip.patch)]
+    best = max(
+        (best, *warmed_each(halves, background, data, settings, marches)),
+        key=lambda suspect: suspect.likeness,
+    )
     marches.record({"doing": _DOING, "suspected_k": best.heat_k, "likeness": best.likeness})
     return best
 
 
-def _likeness(suspect: Suspect) -> float:
-    return suspect.likeness
-
-
 def with_suspected_heat(problem: Problem, suspect: Suspect) -> Problem:
     """The problem with the strip and its neighbours as heaters."""
+    strips = (strip for between in (False, True) for strip in floor_strips(problem, between=between))
     warm = replace(suspect.strip, temperature_k=suspect.strip.temperature_k + suspect.heat_k)
-    beside = [
-        strip
-        for axis in seen_along(problem.scene)
-        for between in (False, True)
-        for strip in floor_strips(problem, axis, warm, between=between)
-        if adjoin(strip, warm, axis)
-    ]
+    beside = [strip for strip in strips if adjoin(strip, warm)]
     std_k = _STD_SHARE * suspect.heat_k
     return with_heaters(problem, [replace(strip, temperature_std_k=std_k) for strip in (warm, *beside)])
 
@@ -155,36 +142,30 @@ def matched(
     return common / max(float(np.sqrt(own * all_left)), tiny), common / max(own, tiny)
 
 
-def floor_strips(
-    problem: Problem, axis: int = 0, place: Heater | None = None, *, between: bool = False
-) -> list[SuspectedHeater]:
-    """Strips of floor that follow one another along an axis, at the temperature of the air.
+def floor_strips(problem: Problem, *, between: bool = False) -> list[SuspectedHeater]:
+    """Strips of floor at the temperature of the air, without those that overlap a stated patch.
 
-    Along the other axis they reach as far as `place` does, and lie in the middle of the room where there is none.
-    Those that overlap a stated patch are left out. `between` gives the strips half-way between these.
+    `between` gives the strips half-way between these.
     """
-    box, scene, across = problem.scene.room, problem.scene, 1 - axis
-    edges_m = np.linspace(box.lower_m[axis], box.upper_m[axis], _STRIPS + 1)
+    box, scene = problem.scene.room, problem.scene
+    edges_m = np.linspace(box.lower_m[0], box.upper_m[0], _STRIPS + 1)
     edges_m = 0.5 * (edges_m[:-1] + edges_m[1:]) if between else edges_m
-    middle_m, half_m = box.centre_m[across], 0.5 * box.size_m[across] / _STRIPS
-    reach_m = (middle_m - half_m, middle_m + half_m)
-    if place is not None:
-        reach_m = (place.patch.lower_m[across], place.patch.upper_m[across])
+    middle_m, half_m = box.centre_m[1], 0.5 * _DEPTH_SHARE * box.size_m[1]
     air_k = scene.air.ambient_temperature_k + (leaving_excess_k(problem) or 0.0)
     taken = [b.patch for b in scene.boundary if isinstance(b, OnPatch)]
     strips = []
-    for ends_m in pairwise(float(edge) for edge in edges_m):
-        x_m, y_m = (ends_m, reach_m) if axis == 0 else (reach_m, ends_m)
-        patch = Patch(wall="z_min", lower_m=(x_m[0], y_m[0]), upper_m=(x_m[1], y_m[1]))
+    for low_m, high_m in pairwise(edges_m):
+        lower, upper = (float(low_m), middle_m - half_m), (float(high_m), middle_m + half_m)
+        patch = Patch(wall="z_min", lower_m=lower, upper_m=upper)
         if not any(share_area(patch, other) for other in taken):
             strips.append(SuspectedHeater(patch=patch, temperature_k=air_k))
     return strips
 
 
-def adjoin(one: Heater, other: Heater, axis: int) -> bool:
-    """Whether two strips lie side by side along an axis."""
-    a, b = one.patch, other.patch
-    return a.upper_m[axis] == b.lower_m[axis] or b.upper_m[axis] == a.lower_m[axis]
+def adjoin(one: Heater, other: Heater) -> bool:
+    """Whether two strips lie side by side."""
+    ends = (one.patch.lower_m[0], one.patch.upper_m[0]), (other.patch.lower_m[0], other.patch.upper_m[0])
+    return ends[0][1] == ends[1][0] or ends[1][1] == ends[0][0]
 
 
 def with_heaters(problem: Problem, heaters: Sequence[Heater]) -> Problem:

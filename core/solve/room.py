@@ -37,7 +37,6 @@ from core.problem import Problem
 from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
 from core.room.forward import carried_over, closure_name, room
-from core.view_frame import seen_along
 from core.watch import Watch
 
 
@@ -105,7 +104,7 @@ def analyse(background: Background, problem: Problem, settings: RoomSettings, ma
         if left_over(again) < KEEP_HEAT * left_over(analysis):
             notes, analysis = (), again
         else:
-            notes = (*notes, missing_heat(suspect.strip, suspect.likeness, seen_along(problem.scene)))
+            notes = (*notes, missing_heat(suspect.strip, suspect.likeness))
     doing = "take the room that was found"
     marches.record({"doing": doing, **supplied(analysis.layout, analysis.best)})
     found = solution(analysis, marches.elapsed_s, use_images=settings.use_images, notes=notes)

@@ -21,8 +21,7 @@ from core.estimate.unstated_heat import (
 from core.problem import Problem
 from core.room.boundary_conditions import boundary
 from core.room.forward import room
-from core.scene import Heater, Inlet, Outlet, Patch, View
-from core.view_frame import seen_along
+from core.scene import Heater, Inlet, Outlet, Patch
 from tests.core.estimate.test_temperature_levels import VERTICES, problem
 
 
@@ -38,7 +37,7 @@ def test_strips_cover_the_floor_from_end_to_end_half_way_into_the_room():
     assert {(s.patch.wall, s.patch.lower_m[1], s.patch.upper_m[1]) for s in found} == {("z_min", 0.8, 1.2)}
     # As warm as the air that leaves, so that nothing drives anything before the images are asked.
     assert [s.temperature_k for s in found] == pytest.approx([298.15] * 5)
-    assert [adjoin(found[2], other, 0) for other in found] == [False, True, False, True, False]
+    assert [adjoin(found[2], other) for other in found] == [False, True, False, True, False]
 
 
 def test_strips_half_way_between_adjoin_one_another_only():
@@ -47,27 +46,8 @@ def test_strips_half_way_between_adjoin_one_another_only():
 
     edges = [(s.patch.lower_m[0], s.patch.upper_m[0]) for s in between]
     np.testing.assert_allclose(edges, [(0.4 * n + 0.2, 0.4 * n + 0.6) for n in range(4)])
-    assert [adjoin(between[1], other, 0) for other in between] == [True, False, True, False]
-    assert not any(adjoin(between[1], other, 0) for other in found)
-
-
-def test_where_two_views_tell_both_ways_strips_follow_one_another_along_y_as_well():
-    given = problem(stated=False)
-    across = View(camera=given.scene.views[0].camera, wall="x_max", name="across")
-    both = Problem(replace(given.scene, views=(*given.scene.views, across)), ())
-    assert seen_along(given.scene) == (0,)
-    assert seen_along(both.scene) == (0, 1)
-    assert seen_along(replace(given.scene, views=(across,))) == (1,)
-
-    suspect = Suspect(0.6, 20.0, floor_strips(both, 1, floor_strips(both)[3])[1])
-    assert suspect.strip.patch.lower_m == pytest.approx((1.2, 0.4))
-    assert suspect.strip.patch.upper_m == pytest.approx((1.6, 0.8))
-    added = [b for b in with_suspected_heat(both, suspect).scene.boundary if isinstance(b, Heater)]
-    corners = [(1.2, 0.4), (0.8, 0.4), (1.6, 0.4), (1.2, 0.0), (1.2, 0.8)]
-    np.testing.assert_allclose([b.patch.lower_m for b in added], corners, atol=1e-12)
-    assert "at x = 1.2 to 1.6 m, y = 0.4 to 0.8 m" in missing_heat(suspect.strip, 0.6, (0, 1))
-    (said,) = suspicion(suspect.strip, 42.3, (0, 1))
-    assert "at x = 1.2 to 1.6 m, y = 0.4 to 0.8 m. State it as a heater." in said
+    assert [adjoin(between[1], other) for other in between] == [True, False, True, False]
+    assert not any(adjoin(between[1], other) for other in found)
 
 
 @pytest.mark.parametrize("strength", [0.2, 5.0])
@@ -96,7 +76,7 @@ def test_the_suspect_enters_the_fit_with_its_neighbours():
     assert [b.temperature_k - air_k for b in added] == pytest.approx([20.0, 0.0, 0.0])
     assert [b.patch.lower_m[0] for b in added] == pytest.approx([0.8, 0.4, 1.2])
     assert {b.temperature_std_k for b in added} == {10.0}
-    assert "x = 0.8 to 1.2 m" in missing_heat(suspect.strip, suspect.likeness, (0,))
+    assert "x = 0.8 to 1.2 m" in missing_heat(suspect.strip, suspect.likeness)
 
 
 def test_a_strip_is_left_out_where_another_patch_lies():
@@ -130,11 +110,11 @@ def test_a_strip_s_heat_is_fitted_and_its_temperature_shown_nowhere():
 
 def test_what_the_images_ask_for_is_said_and_a_strip_that_hardly_moved_is_not():
     strip = floor_strips(problem(stated=False))[3]
-    (said,) = suspicion(strip, 42.3, (0,))
+    (said,) = suspicion(strip, 42.3)
 
     assert "0.40 x 0.40 m, 42 K warmer than the air, at x = 1.2 to 1.6 m" in said
     assert "State it as a heater." in said
-    assert suspicion(strip, 3.0, (0,)) == []
+    assert suspicion(strip, 3.0) == []
 
 
 def test_a_room_that_only_suspected_heat_drives_is_still_called_undetermined():
