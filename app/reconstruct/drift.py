@@ -31,8 +31,8 @@ from core.problem import ShiftMeasurement
 
 # A motion is never known better than this.
 _LEAST_PX = 1e-4
-# Air moves the picture by hundredths of a pixel: a border that tells the motion to more than that (of a mount that is
-# stable to a pixel, so much) is of no use.
+# A border is of use if it leaves the motion less uncertain than this share of the mount's deviation. Of a mount that
+# is stable to 1 px this is what air moves the picture by: hundredths of a pixel.
 _TELLS = 0.05
 # Two references tell a motion of any size.
 _UNBOUND_PX = 100.0
@@ -160,7 +160,10 @@ def _moved(middle_px: Float[np.ndarray, " 2"], motion_px: Motion) -> str:
 def _unknown(middle_px: Float[np.ndarray, " 2"], prior: MotionPrior, border: Rigid | None) -> str:
     why = "No part of the picture is free of the room's air."
     if border is not None:
-        why = f"The border of the picture is not still: {border.what_is_left}; the room's air is before it."
+        why = (
+            f"The border of the picture is not still: {border.what_is_left}, so the room's air is before it, or "
+            "something moved there."
+        )
     return (
         f"{why} The middle of the picture moved by {middle_px[0]:+.3f} px across, {middle_px[1]:+.3f} px down. How "
         f"much of that is the camera is not known exactly ({prior.source}), and is estimated together with the air."

@@ -29,8 +29,8 @@ _NOISE_FACTOR, _SIGMAS = 1.3, 4.0
 # What air does to a border is smooth: a polynomial of this degree along both. One still border in so many is said to
 # have air before it.
 _SMOOTH, _LEAST_CHANCE = 4, 1e-4
-# What is smooth and like no motion tells how much may be smooth and like one: of each motion at most so many times as
-# much, before nine borders of five rooms at 4 and 30.5 m (README of tests/benchmarks).
+# What air leaves once a motion of the camera is taken out tells how much of the motion may be air: of each of the six
+# at most so many times as much, before nine borders of five rooms at 4 and 30.5 m (README of tests/benchmarks).
 _HIDDEN = 2.0
 # Fewer windows than this say nothing of a rigid motion: in all, and in one of several parts.
 _LEAST_WINDOWS, _LEAST_IN_PART = 12, 4
@@ -143,10 +143,10 @@ def _fitted(
 
 
 def believed(read: Rigid, prior: MotionPrior, optics: Optics) -> Rigid:
-    """What a border tells, whatever air is before it.
+    """What a border tells if some of its reading may be air.
 
-    What of the air is smooth and moves the windows as the camera would adds to each motion the variance that
-    `alike_px` tells. Each motion goes back towards the prior as far as it is less certain now.
+    Air may move the windows as the camera would. `alike_px` says by how much: so large a variance is added to each
+    motion, and each goes back towards the prior as far as it is less certain now.
     """
     vectors, size_px, _ = np.linalg.svd(read.root_px)
     told = np.maximum(size_px**-2 - prior.std_px**-2, 0.0)

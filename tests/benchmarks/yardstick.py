@@ -1,4 +1,4 @@
-"""Is a border with the room's air before it refused as still, and a truly still one accepted? Over seeds.
+"""Is a border with the room's air before it doubted, and a truly still one believed? Over seeds.
 
     python -m tests.benchmarks.yardstick ROOM.npz --seeds 20
 
@@ -48,8 +48,8 @@ def judged(truth: Path, border: Border, seed: int, camera_px: int, frames: int) 
         "camera_px": camera_px,
         "frames": frames,
         "drift_px": camera.drift_px,
-        "taken_as_still": "from the border" in note and "not be still" not in note,
-        "refused": "not still" in note or "not be still" in note,
+        "taken_as_still": "from the border" in note and "may not be still" not in note,
+        "refused": "is not still" in note or "may not be still" in note,
         "note": note,
     }
 

@@ -87,14 +87,13 @@ def test_a_border_with_air_before_it_is_believed_as_far_as_what_it_leaves_says()
     assert known_px == sorted(known_px)
 
 
-def test_a_border_that_air_moves_as_far_as_the_mount_may_leaves_the_creep_unknown():
-    shift, drift_px, note = drift_of(
-        exposures(1, lambda x, y: tuple(20.0 * px for px in air_everywhere(x, y)))
-    )
-    assert "is not still" in note
-    assert not drift_px.any()
-    assert shift.motion is not None
-    np.testing.assert_allclose(shift.motion.root_px, np.eye(6))
+def test_a_border_with_much_air_before_it_leaves_the_creep_unknown():
+    for seed in range(6):
+        shift, drift_px, note = drift_of(exposures(seed, air_everywhere))
+        assert "not still" in note
+        assert not drift_px.any()
+        assert shift.motion is not None
+        np.testing.assert_allclose(shift.motion.root_px, np.eye(6))
 
 
 def test_things_that_move_before_a_part_of_the_border_do_not_tell_its_motion():
