@@ -21,6 +21,7 @@ from app.reconstruct.yardstick import (
     Yardstick,
     aligned,
     believed,
+    read_border,
     read_motion,
     trusted,
 )
@@ -109,11 +110,16 @@ def without_known_drift(
     said = "".join(f"{why} " for why in still.refused)
     if still.read is not None:
         return _known(exposures, still.read, said, f"the {_listed(still.names)}")
-    read = read_motion(exposures, border, prior)
+    read = read_border(exposures, border, prior)
     told = None if read is None else believed(read, prior, exposures.optics)
     if told is not None and _unknown_px(told, exposures) < _TELLS * prior.std_px:
         if not told.is_rigid:
             said += f"The border of the picture may not be still: {told.what_is_left}. "
+        if told.odd:
+            said += (
+                f"{100 * told.odd:.2g} % of the border moves unlike the rest (something moved there, or the room's "
+                "air is before it) and does not count. "
+            )
         return _known(exposures, told, said, "the border")
     shift, drift_px = aligned(exposures, in_room, prior)
     back_px = motion_basis(shift.centres_px, exposures.optics) @ (drift_px - prior.mean_px)

@@ -29,9 +29,8 @@ _NOISE_FACTOR, _SIGMAS = 1.3, 4.0
 # What air does to a border is smooth: a polynomial of this degree along both. One still border in so many is said to
 # have air before it.
 _SMOOTH, _LEAST_CHANCE = 4, 1e-4
-# What air leaves once a motion of the camera is taken out tells how much of the motion may be air: of each of the six
-# at most so many times as much, before nine borders of five rooms at 4 and 30.5 m (README of tests/benchmarks).
-_HIDDEN = 2.0
+# Of a border a window is odd that leaves more than so many times what the median one does: of noise one in 2**20.
+_ODD = 20.0
 # Fewer windows than this say nothing of a rigid motion: in all, and in one of several parts.
 _LEAST_WINDOWS, _LEAST_IN_PART = 12, 4
 # A window that knows its shift no better than to a pixel shows nothing: a bare wall is of such windows.
@@ -84,29 +83,31 @@ class MotionPrior:
 class Rigid:
     """The motion of the camera that some windows and its prior tell, and what it leaves of the windows.
 
-    `shift` is that of all windows without the motion. The columns of `root_px` are what stays unknown of it, in
-    motions of one standard deviation; `unlike` is the mean square, over its noise, of what the motion leaves of the
-    windows that were asked. `alike_px` is how large (rms) a part of that is alike in neighbours, and never less than
-    noise may hide; `by_chance` is how likely noise alone would leave so much of it.
+    `shift` is that of all windows without the motion, `asked` those that told it. The columns of `root_px` are what
+    stays unknown of it, in motions of one standard deviation; `unlike` is the mean square, over its noise, of what
+    the motion leaves of the windows that were asked. `alike_px` is how large (rms) a part of that is alike in
+    neighbours, and never less than noise may hide; `by_chance` is how likely noise alone would leave so much of it.
+    `odd` is the share of the windows that moved unlike the others and do not count.
     """
 
     shift: ShiftMeasurement
+    asked: Mask
     motion_px: Motion
     root_px: Float[np.ndarray, "6 6"]
     unlike: float
     alike_px: float
     by_chance: float
-    windows: int
+    odd: float = 0.0
 
     @property
     def is_rigid(self) -> bool:
         """Whether what the motion leaves is noise: no more than that, and no likeness between neighbours."""
-        return is_noise(self.unlike, self.windows) and self.by_chance > _LEAST_CHANCE
+        return is_noise(self.unlike, int(self.asked.sum())) and self.by_chance > _LEAST_CHANCE
 
     @property
     def what_is_left(self) -> str:
         """What the motion leaves, in words."""
-        if is_noise(self.unlike, self.windows):
+        if is_noise(self.unlike, int(self.asked.sum())):
             alike_px = f"{self.alike_px:.2g} px"
             return f"what a rigid motion leaves moves neighbouring windows alike by {alike_px}, as air does"
         return f"what a rigid motion leaves is {self.unlike**0.5:.1f} times its noise"
@@ -119,6 +120,28 @@ def read_motion(exposures: Exposures, windows: Mask, prior: MotionPrior) -> Rigi
         return None
     shift, drift_px = aligned(exposures, windows, prior)
     return _fitted(shift, windows, exposures.optics, prior, drift_px)
+
+
+def read_border(exposures: Exposures, border: Mask, prior: MotionPrior) -> Rigid | None:
+    """The motion of the camera as a border tells it, if most of it is still; None where too little shows something.
+
+    Of a thing that stands before a part of it, or moved there, a few windows move unlike all others. Those do not
+    count.
+    """
+    read, alike = read_motion(exposures, border, prior), border
+    for _ in range(_PASSES):
+        if read is None:
+            return None
+        left_px = read.shift.displacement_px
+        misfit = np.einsum("wa,wab,wb->w", left_px, read.shift.information_per_px2, left_px) / 2
+        typical = max(float(np.median(misfit[good_windows(read.shift, alike)])), np.log(2.0))
+        before, alike = alike, border & (misfit <= _ODD * typical)
+        if np.array_equal(before, alike):
+            break
+        read = read_motion(exposures, alike, prior)
+    if read is None:
+        return None
+    return replace(read, odd=1.0 - read.asked.sum() / good_windows(read.shift, border).sum())
 
 
 def _fitted(
@@ -134,23 +157,26 @@ def _fitted(
     values, vectors = np.linalg.eigh(covariance)
     return Rigid(
         replace(shift, displacement_px=left_px),
+        good,
         taken_px + rest_px,
         max(1.0, unlike) ** 0.5 * vectors * np.sqrt(np.maximum(values, 0.0)),
         unlike,
         *_alike(shift, left_px, good, optics),
-        int(good.sum()),
     )
 
 
 def believed(read: Rigid, prior: MotionPrior, optics: Optics) -> Rigid:
     """What a border tells if some of its reading may be air.
 
-    Air may move the windows as the camera would. `alike_px` says by how much: so large a variance is added to each
-    motion, and each goes back towards the prior as far as it is less certain now.
+    Air moves neighbours alike, and in part as each motion of the camera would: by as much, as far as anybody knows,
+    as it moves them otherwise (`alike_px`). A motion that moves the border less may so be wrong by more. That
+    variance is added to each, and each goes back towards the prior as far as it is less certain now.
     """
     vectors, size_px, _ = np.linalg.svd(read.root_px)
     told = np.maximum(size_px**-2 - prior.std_px**-2, 0.0)
-    less = told / (1.0 + told * (_HIDDEN * read.alike_px) ** 2)
+    border = motion_basis(read.shift.centres_px[read.asked], optics) @ vectors
+    air_px = read.alike_px / np.sqrt(np.mean(border**2, axis=(0, 1)))
+    less = told / (1.0 + told * air_px**2)
     variance = 1.0 / (less + prior.std_px**-2)
     kept = np.divide(variance * less, size_px**2 * told, out=np.zeros(MOTIONS), where=told > 0)
     back_px = (vectors * (1.0 - kept)) @ vectors.T @ (read.motion_px - prior.mean_px)

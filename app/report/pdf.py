@@ -145,7 +145,7 @@ def _second(finding: Finding) -> Iterable[Flowable]:
     yield _text("Method and rig", _HEAD)
     yield _text(_METHOD, _TEXT)
     known = "; ".join(f"{name}: {words}" for name, words in facts(finding.experiment))
-    yield _text(_short(known, 3 * _LONGEST), _SMALL)
+    yield _text(_short(known, 3 * _LONGEST, "; "), _SMALL)
     yield _text("What was assumed, and limits", _HEAD)
     told_of = [_short(sentence) for sentence in assumed(finding.manifest)][:_NOTES]
     yield _text(" ".join(told_of), _SMALL)
@@ -237,5 +237,7 @@ def _table(heads: tuple[str, ...], make, shares: tuple[float, ...]) -> Iterable[
     yield Spacer(1, 1.5 * mm)
 
 
-def _short(sentence: str, longest: int = _LONGEST) -> str:
-    return sentence if len(sentence) <= longest else sentence[: longest - 1].rstrip() + "…"
+def _short(text: str, longest: int = _LONGEST, between: str = ". ") -> str:
+    """Of a text that is too long the sentences that have place, and the first one in any case."""
+    end = len(text) if len(text) <= longest else text.rfind(between, 0, longest) + 1
+    return text[: end or text.find(between) + 1 or len(text)]

@@ -1,5 +1,7 @@
 """Where the camera's motion is read off: a border that is still, and one that the room's air is before."""
 
+import re
+
 import numpy as np
 from scipy import ndimage
 
@@ -104,6 +106,22 @@ def test_things_that_move_before_a_part_of_the_border_do_not_tell_its_motion():
     assert "from the border" in note
     basis = motion_basis(CENTRES, LENS)
     np.testing.assert_allclose(basis @ drift_px, basis @ CREEP_PX, atol=0.02)
+
+
+def pushed(x, y):
+    """A thing before one corner of the border that somebody pushed."""
+    return 0.5 * ((x < 0.2) & (y < 0.3)), 0.0 * y
+
+
+def test_a_thing_that_was_pushed_before_a_part_of_a_still_border_does_not_count():
+    basis = motion_basis(CENTRES, LENS)
+    for seed in range(3):
+        _, drift_px, note = drift_of(exposures(seed, pushed))
+        assert "may not be still" not in note
+        assert re.search(r"\d % of the border moves unlike the rest", note)
+        np.testing.assert_allclose(basis @ drift_px, basis @ CREEP_PX, atol=6e-3)
+    # Between two references the whole wall has to be still.
+    assert not agreement(exposures(0, pushed), BEYOND).agree
 
 
 def test_a_bare_border_says_nothing_and_the_creep_stays_in_the_shifts():
