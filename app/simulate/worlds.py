@@ -105,6 +105,7 @@ def one_by_one(world: RigWorld) -> dict[str, RigWorld]:
         "drift, nothing still": replace(nothing, drift_px=world.drift_px, border="bare"),
         "entries misread": replace(nothing, misreads=True),
         "all, still border": replace(world, border="print"),
+        "all, textured room": replace(world, border="room"),
         "all, marks": replace(world, marks=True),
         "all, bracketed": replace(world, bracketed=True),
         "all": world,
