@@ -165,7 +165,12 @@ def _moved(middle_px: Float[np.ndarray, " 2"], motion_px: Motion) -> str:
 
 def _unknown(middle_px: Float[np.ndarray, " 2"], prior: MotionPrior, border: Rigid | None) -> str:
     why = "No part of the picture is free of the room's air."
-    if border is not None:
+    if border is not None and border.is_rigid:
+        shown = int(border.asked.sum())
+        why = (
+            f"The {shown} windows beyond the wall that show something tell too little of the camera's motion."
+        )
+    elif border is not None:
         why = (
             f"The border of the picture is not still: {border.what_is_left}, so the room's air is before it, or "
             "something moved there."

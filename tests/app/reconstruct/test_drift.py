@@ -132,6 +132,15 @@ def test_a_bare_border_says_nothing_and_the_creep_stays_in_the_shifts():
     np.testing.assert_allclose(shift.displacement_px[inner].mean(0), expected.mean(0), atol=0.02)
 
 
+def test_a_corner_of_the_border_is_still_but_tells_too_little():
+    corner = BEYOND & np.all(CENTRES < 48, axis=1)
+    shift, drift_px, note = without_known_drift(exposures(1, still_air), ~BEYOND, corner, mount(1.0))
+    assert f"The {corner.sum()} windows beyond the wall that show something tell too little" in note
+    assert not drift_px.any()
+    assert shift.motion is not None
+    np.testing.assert_allclose(shift.motion.root_px, np.eye(6))
+
+
 def test_a_camera_that_is_stated_to_stand_still_is_believed_where_nothing_says_otherwise():
     shift, _, note = without_known_drift(exposures(2, still_air), ~BEYOND, BEYOND & False, mount(0.0))
     assert "stand still" in note
