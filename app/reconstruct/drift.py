@@ -1,9 +1,9 @@
 """The camera's motion between two exposures: read off what is still, and what stays unknown of it.
 
 Marks that somebody drew, or a part of the picture beyond the back wall, are still if they move like a rigid picture:
-the camera's motion is read off them. What such a motion leaves of them says how far they are believed. Where there is
-none, or they moved otherwise, the motion stays in the shifts, with the mount's stability as its prior. The solvers
-marginalise what is unknown of it (`core.motion`).
+the camera's motion is read off them. Before a border as much air may be as the noise hides. Where nothing is still,
+the motion stays in the shifts, with the mount's stability as its prior. The solvers marginalise what is unknown of it
+(`core.motion`).
 """
 
 from collections.abc import Sequence
@@ -111,10 +111,8 @@ def without_known_drift(
     if still.read is not None:
         return _known(exposures, still.read, said, f"the {_listed(still.names)}")
     read = read_border(exposures, border, prior)
-    told = None if read is None else believed(read, prior, exposures.optics)
+    told = believed(read, prior, exposures.optics) if read is not None and read.is_rigid else None
     if told is not None and _unknown_px(told, exposures) < _TELLS * prior.std_px:
-        if not told.is_rigid:
-            said += f"The border of the picture may not be still: {told.what_is_left}. "
         if told.odd:
             said += (
                 f"{100 * told.odd:.2g} % of the border moves unlike the rest (something moved there, or the room's "

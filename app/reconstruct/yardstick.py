@@ -31,6 +31,9 @@ _NOISE_FACTOR, _SIGMAS = 1.3, 4.0
 _SMOOTH, _LEAST_CHANCE = 4, 1e-4
 # Of a border a window is odd that leaves more than so many times what the median one does: of noise one in 2**20.
 _ODD = 20.0
+# So much of a motion of the whole picture a measured shift may be wrong by, alike in neighbours: 1.1e-3 by
+# `tests.benchmarks.shift`, 1.2e-3 of a sharp print that moved by 0.3 px.
+_BIAS = 2e-3
 # Fewer windows than this say nothing of a rigid motion: in all, and in one of several parts.
 _LEAST_WINDOWS, _LEAST_IN_PART = 12, 4
 # A window that knows its shift no better than to a pixel shows nothing: a bare wall is of such windows.
@@ -87,7 +90,8 @@ class Rigid:
     stays unknown of it, in motions of one standard deviation; `unlike` is the mean square, over its noise, of what
     the motion leaves of the windows that were asked. `alike_px` is how large (rms) a part of that is alike in
     neighbours, and never less than noise may hide; `by_chance` is how likely noise alone would leave so much of it.
-    `odd` is the share of the windows that moved unlike the others and do not count.
+    `moved_px` is how far the windows moved along an axis (rms), and `odd` the share of the windows that moved unlike
+    the others and do not count.
     """
 
     shift: ShiftMeasurement
@@ -97,12 +101,17 @@ class Rigid:
     unlike: float
     alike_px: float
     by_chance: float
+    moved_px: float
     odd: float = 0.0
 
     @property
     def is_rigid(self) -> bool:
-        """Whether what the motion leaves is noise: no more than that, and no likeness between neighbours."""
-        return is_noise(self.unlike, int(self.asked.sum())) and self.by_chance > _LEAST_CHANCE
+        """Whether what the motion leaves is noise: no more than that, and no more alike in neighbours than by chance.
+
+        What is so small beside the motion that measuring it may be wrong by as much is none either.
+        """
+        noise = is_noise(self.unlike, int(self.asked.sum()))
+        return noise and (self.by_chance > _LEAST_CHANCE or self.alike_px < _BIAS * self.moved_px)
 
     @property
     def what_is_left(self) -> str:
@@ -150,7 +159,8 @@ def _fitted(
     """What some windows tell of the rest of a motion, when so much of it is taken out of the shifts."""
     good = good_windows(shift, windows)
     rest_px, covariance = fit_motion(shift, good, optics, prior.mean_px - taken_px, prior.std_px)
-    left_px = shift.displacement_px - motion_basis(shift.centres_px, optics) @ rest_px
+    basis = motion_basis(shift.centres_px, optics)
+    left_px = shift.displacement_px - basis @ rest_px
     squares = np.einsum("wa,wab,wb->w", left_px, shift.information_per_px2, left_px)[good]
     fitted = MOTIONS - np.trace(covariance) / prior.std_px**2
     unlike = float(squares.sum() / max(2 * good.sum() - fitted, 1.0))
@@ -162,11 +172,12 @@ def _fitted(
         max(1.0, unlike) ** 0.5 * vectors * np.sqrt(np.maximum(values, 0.0)),
         unlike,
         *_alike(shift, left_px, good, optics),
+        float(np.sqrt(np.mean((basis[good] @ (taken_px + rest_px)) ** 2))),
     )
 
 
 def believed(read: Rigid, prior: MotionPrior, optics: Optics) -> Rigid:
-    """What a border tells if some of its reading may be air.
+    """What a border tells if some of its reading may be air that the noise hides.
 
     Air moves neighbours alike, and in part as each motion of the camera would: by as much, as far as anybody knows,
     as it moves them otherwise (`alike_px`). A motion that moves the border less may so be wrong by more. That

@@ -30,7 +30,7 @@ from core.motion import motion_basis
 
 BORDERS: tuple[Border, ...] = ("print", "room")
 JUDGED = ("taken_as_still", "refused")
-DOUBTS = ("is not still", "may not be still", "moves unlike the rest")
+DOUBTS = ("is not still", "moves unlike the rest")
 
 
 def judged(
