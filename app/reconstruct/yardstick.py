@@ -108,7 +108,7 @@ class Rigid:
     def is_rigid(self) -> bool:
         """Whether what the motion leaves is noise: no more than that, and no more alike in neighbours than by chance.
 
-        What is so small beside the motion that measuring it may be wrong by as much is none either.
+        What is so small beside the motion that a measured motion may be wrong by as much counts as noise.
         """
         noise = is_noise(self.unlike, int(self.asked.sum()))
         return noise and (self.by_chance > _LEAST_CHANCE or self.alike_px < _BIAS * self.moved_px)
