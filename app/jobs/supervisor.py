@@ -38,7 +38,7 @@ class Supervisor:
     def __init__(self, ledger: Ledger, config: JobsConfig, engine: Engine | None = None) -> None:
         self._ledger = ledger
         self._config = config
-        self._engine = create_engine(config, ledger.folder) if engine is None else engine
+        self._engine = create_engine(config) if engine is None else engine
         self._dispatch = Dispatch(ledger)
         self._watch = JobWatch(self._dispatch, self._engine, config, ledger.folder)
         self._troubles = Troubles(self._dispatch, config.start_limit_s, self._kill)

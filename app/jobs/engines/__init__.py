@@ -1,7 +1,5 @@
 """The engine that a configuration names."""
 
-from pathlib import Path
-
 from app.jobs.config import JobsConfig
 from app.jobs.engines.engine import Engine
 from app.jobs.engines.local import LocalEngine
@@ -9,10 +7,10 @@ from app.jobs.engines.ray import RayEngine
 from app.jobs.engines.slurm import SlurmEngine
 
 
-def create_engine(config: JobsConfig, folder: Path) -> Engine:
-    """Return the configured engine; `folder` keeps what it caches."""
+def create_engine(config: JobsConfig) -> Engine:
+    """Return the configured engine."""
     engines = {
-        "local": lambda: LocalEngine(folder / "cache"),
+        "local": LocalEngine,
         "ray": lambda: RayEngine(config.ray),
         "slurm": lambda: SlurmEngine(config.slurm),
     }

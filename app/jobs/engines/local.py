@@ -4,7 +4,6 @@ import contextlib
 import os
 import signal
 import sys
-from pathlib import Path
 
 import psutil
 
@@ -19,8 +18,7 @@ class LocalEngine:
 
     name = "local"
 
-    def __init__(self, cache: Path) -> None:
-        self._cache = cache
+    def __init__(self) -> None:
         self._children: set[int] = set()
         self._ended: dict[int, int] = {}
 
@@ -35,7 +33,7 @@ class LocalEngine:
             pid = os.posix_spawn(
                 sys.executable,
                 [sys.executable, *launch.worker_arguments],
-                _environment(launch.device, self._cache),
+                _environment(launch.device),
                 file_actions=[
                     (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
                     (os.POSIX_SPAWN_OPEN, 1, log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644),
@@ -99,11 +97,10 @@ class LocalEngine:
             self._children.discard(pid)
 
 
-def _environment(device: str, cache: Path) -> dict[str, str]:
-    """Return the worker's environment: its device, a kept compilation cache, no token of the service."""
+def _environment(device: str) -> dict[str, str]:
+    """Return the worker's environment: its device, and no token of the service."""
     variables = {name: value for name, value in os.environ.items() if "TOKEN" not in name}
     kind, _, index = device.partition(":")
-    variables["JAX_COMPILATION_CACHE_DIR"] = str(cache)
     variables["JAX_PLATFORMS"] = "cpu" if kind == "cpu" else variables.get("JAX_PLATFORMS", "")
     if kind == "gpu":
         variables["CUDA_VISIBLE_DEVICES"] = index or "0"

@@ -18,8 +18,8 @@ NO_RESERVE = JobsConfig(memory_reserve_bytes=0)
 
 
 @pytest.fixture
-def engine(tmp_path: Path) -> LocalEngine:
-    return LocalEngine(tmp_path / "cache")
+def engine() -> LocalEngine:
+    return LocalEngine()
 
 
 @pytest.fixture
