@@ -52,6 +52,7 @@ def reconstruct(
     from app.jobs.checkpoints import FolderStore
     from app.pipeline import reconstruct as run
     from app.plan.under_way import process_age_s
+    from app.report.answer import advice, summary
     from core.watch import StoppedError, Watch
 
     kept = open_experiment(experiment).checkpoint_folder
@@ -59,30 +60,36 @@ def reconstruct(
     if len(store) > 0:
         typer.echo(f"Going on from {kept}, where captures and settings are the same.", err=True)
     try:
-        with _progress(quiet=as_json) as told, _interruptible() as stop:
-            watch = Watch(told, stop.is_set, store)
+        with _progress(quiet=as_json) as shown, _interruptible() as stop:
+            watch = Watch(shown, stop.is_set, store)
             done = run(experiment, preset, sequence=sequence, watch=watch, start_s=process_age_s())
     except StoppedError:
         typer.echo(f"Stopped. What was done is kept in {kept}; the same command goes on from it.", err=True)
         raise typer.Exit(130) from None
     shutil.rmtree(kept, ignore_errors=True)
-    summary = {
-        "result": str(done.folder / "result.nc"),
-        "report": done.no_report or str(done.folder / "report.html"),
-        "outcome": done.solution.outcome.name,
-        "advice": done.solution.outcome.value,
-        "solver_s": done.solution.solver_s,
-        "wall_s": done.wall_s,
-        "found": [one.sentence for one in done.measurement.found],
-        "promised_s": done.promised_s,
-    }
+    answer, better = summary(done.finding), advice(done.finding)
+    found = [one.sentence for one in done.measurement.found]
+    result, report = str(done.folder / "result.nc"), done.no_report or str(done.folder / "report.html")
+    outcome = done.solution.outcome
     if as_json:
-        typer.echo(json.dumps(summary, indent=1))
-    else:
-        typer.echo(f"{summary['outcome']}: {summary['advice']} Solver {done.solution.solver_s:.1f} s.")
-        for one in done.measurement.found:
-            typer.echo(one.sentence)
-        typer.echo(f"result {summary['result']}\nreport {summary['report']}")
+        told = {
+            "result": result,
+            "report": report,
+            "outcome": outcome.name,
+            "advice": outcome.value,
+            "answer": answer,
+            "to_know_better": better,
+            "solver_s": done.solution.solver_s,
+            "wall_s": done.wall_s,
+            "found": found,
+            "promised_s": done.promised_s,
+        }
+        typer.echo(json.dumps(told, indent=1))
+        return
+    typer.echo(f"{outcome.name}: {outcome.value} Solver {done.solution.solver_s:.1f} s.")
+    for sentence in (*answer, *found, *(f"To know better: {first}" for first in better[:1])):
+        typer.echo(sentence)
+    typer.echo(f"result {result}\nreport {report}")
 
 
 class _Shown:

@@ -58,13 +58,14 @@ def _ventilation(finding: Finding) -> str:
     figures = {one.key: one for one in finding.indoor.quantities}
     upwards = figures["floor_to_ceiling"]
     higher = f"{abs(upwards.value):.1f} K {'warmer' if upwards.value > 0 else 'colder'}"
-    ceiling = f"at the ceiling it is {higher} than at the floor"
+    ceiling = f"the ceiling it is {higher} than at the floor"
     if "speed_mean" not in figures:
-        return f"{ceiling.capitalize()}; its velocity was not found, so nothing is told of draught and ventilation."
+        return f"At {ceiling}; its velocity was not found, so nothing is told of draught and ventilation."
     if "air_changes" not in figures:
-        return f"{ceiling.capitalize()}; how its air is changed is not known."
+        return f"At {ceiling}; how its air is changed is not known."
     changes, efficiency = figures["air_changes"], figures["efficiency"]
-    return f"The supply changes the air {_value(changes, 'times an hour')} and {ventilates(efficiency)}; {ceiling}."
+    changed = f"The supply changes the air {_value(changes, 'times an hour')}"
+    return f"{changed} and {ventilates(efficiency)}; at {ceiling}."
 
 
 def ventilates(efficiency: Quantity) -> str:

@@ -33,7 +33,9 @@ def test_a_small_surveyed_room_is_found_by_the_command_line_with_velocity_and_pr
     )
     airlens("simulate", folder, *options)
     state_grid(folder, 8)
-    airlens("reconstruct", folder, "--preset", "standard")
+    said = airlens("reconstruct", folder, "--preset", "standard")
+    assert "Where people are the air is" in said
+    assert "To know better: " in said
 
     scores = json.loads(airlens("score", folder, "--truth", ROOM, "--json"))
 

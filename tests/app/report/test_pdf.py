@@ -1,5 +1,6 @@
 """The report to hand on: three sentences for an answer, what would make it surer, and two pages of PDF."""
 
+import dataclasses
 import re
 
 import pytest
@@ -9,7 +10,7 @@ from app.cli import create_cli
 from app.report.answer import advice, summary, tiles
 from app.report.finding import read_finding
 from app.report.indoor import told
-from app.report.pdf import write_pdf
+from app.report.pdf import _short, write_pdf
 from tests.app.report.test_indoor import experiment  # noqa: F401
 
 
@@ -33,6 +34,22 @@ def test_the_answer_is_three_sentences_without_jargon(finding):
     assert "4.0 K warmer than at the floor" in said[1]
     assert "no truth" in said[2]
     assert not any(word in " ".join(said) for word in ("rms", "sigma", "posterior", "px"))
+
+
+def test_where_no_velocity_was_found_the_answer_says_so(finding):
+    alone = dataclasses.replace(finding.solution, velocity_m_s=None, velocity_std_m_s=None)
+    said = summary(dataclasses.replace(finding, solution=alone))
+    assert said[0] == "Where people are the air is 23.9 °C (23.8 to 23.9) on the mean."
+    assert said[1].startswith(
+        "At the ceiling it is 4.0 K warmer than at the floor; its velocity was not found"
+    )
+
+
+def test_a_text_that_is_too_long_for_the_pdf_ends_with_a_whole_sentence():
+    assert _short("One. Two. Three.", 12) == "One. Two."
+    assert _short("A first one that is too long. Two.", 12) == "A first one that is too long."
+    assert _short("supply: x; outlet: y; wall: z", 22, "; ") == "supply: x; outlet: y;"
+    assert _short("One. Two.", 12) == "One. Two."
 
 
 def test_what_is_seen_at_a_glance_is_what_the_table_tells(finding):
