@@ -135,9 +135,9 @@ def read_border(exposures: Exposures, border: Mask, prior: MotionPrior) -> Rigid
     """The motion of the camera as a border tells it, if most of it is still; None where too little shows something.
 
     Of a thing that stands before a part of it, or moved there, a few windows move unlike all others. Those do not
-    count.
+    tell the motion. In what it leaves each counts as much as one that is just not odd: many are no chance.
     """
-    read, alike = read_motion(exposures, border, prior), border
+    read, alike, typical = read_motion(exposures, border, prior), border, 0.0
     for _ in range(_PASSES):
         if read is None:
             return None
@@ -150,7 +150,8 @@ def read_border(exposures: Exposures, border: Mask, prior: MotionPrior) -> Rigid
         read = read_motion(exposures, alike, prior)
     if read is None:
         return None
-    return replace(read, odd=1.0 - read.asked.sum() / good_windows(read.shift, border).sum())
+    odd = float(1.0 - read.asked.sum() / good_windows(read.shift, border).sum())
+    return replace(read, odd=odd, unlike=(1.0 - odd) * read.unlike + odd * _ODD * typical)
 
 
 def _fitted(

@@ -120,6 +120,10 @@ def test_a_thing_that_was_pushed_before_a_part_of_a_still_border_does_not_count(
         _, drift_px, note = drift_of(exposures(seed, pushed))
         assert re.search(r"\d % of the border moves unlike the rest", note)
         np.testing.assert_allclose(basis @ drift_px, basis @ CREEP_PX, atol=6e-3)
+    # Where a fifth of it moves otherwise nobody knows which part is still.
+    _, drift_px, note = drift_of(exposures(0, lambda x, y: (0.5 * (x < 0.2), 0.0 * y)))
+    assert "The border of the picture is not still" in note
+    assert not drift_px.any()
     # Between two references the whole wall has to be still.
     assert not agreement(exposures(0, pushed), BEYOND).agree
 
