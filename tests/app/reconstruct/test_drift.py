@@ -111,7 +111,7 @@ def test_things_that_move_before_a_part_of_the_border_do_not_tell_its_motion():
 
 def pushed(x, y):
     """A thing before one corner of the border that somebody pushed."""
-    return 0.5 * ((x < 0.2) & (y < 0.3)), 0.0 * y
+    return 0.5 * ((x < 0.2) & (y < 0.2)), 0.0 * y
 
 
 def test_a_thing_that_was_pushed_before_a_part_of_a_still_border_does_not_count():
