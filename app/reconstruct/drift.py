@@ -1,9 +1,9 @@
 """The camera's motion between two exposures: read off what is still, and what stays unknown of it.
 
 Marks that somebody drew, or a part of the picture beyond the back wall, are still if they move like a rigid picture:
-the camera's motion is read off them. Before a border as much air may be as the noise hides. Where nothing is still,
-the motion stays in the shifts, with the mount's stability as its prior. The solvers marginalise what is unknown of it
-(`core.motion`).
+the camera's motion is read off them. There may be as much air before a border as the noise hides, and that counts in
+how well it tells the motion. Where nothing is still, the motion stays in the shifts, with the mount's stability as
+its prior. The solvers marginalise what is unknown of it (`core.motion`).
 """
 
 from collections.abc import Sequence

@@ -91,7 +91,7 @@ class Rigid:
     the motion leaves of the windows that were asked. `alike_px` is how large (rms) a part of that is alike in
     neighbours, and never less than noise may hide; `by_chance` is how likely noise alone would leave so much of it.
     `moved_px` is how far the windows moved along an axis (rms), and `odd` the share of the windows that moved unlike
-    the others and do not count.
+    the others and do not tell the motion.
     """
 
     shift: ShiftMeasurement
@@ -135,14 +135,13 @@ def read_border(exposures: Exposures, border: Mask, prior: MotionPrior) -> Rigid
     """The motion of the camera as a border tells it, if most of it is still; None where too little shows something.
 
     Of a thing that stands before a part of it, or moved there, a few windows move unlike all others. Those do not
-    tell the motion. In what it leaves each counts as much as one that is just not odd: many are no chance.
+    tell the motion. In what it leaves each counts as one that is just not odd, so many of them have it refused.
     """
     read, alike, typical = read_motion(exposures, border, prior), border, 0.0
     for _ in range(_PASSES):
         if read is None:
             return None
-        left_px = read.shift.displacement_px
-        misfit = np.einsum("wa,wab,wb->w", left_px, read.shift.information_per_px2, left_px) / 2
+        misfit = _squares(read.shift) / 2
         typical = max(float(np.median(misfit[good_windows(read.shift, alike)])), np.log(2.0))
         before, alike = alike, border & (misfit <= _ODD * typical)
         if np.array_equal(before, alike):
@@ -162,12 +161,12 @@ def _fitted(
     rest_px, covariance = fit_motion(shift, good, optics, prior.mean_px - taken_px, prior.std_px)
     basis = motion_basis(shift.centres_px, optics)
     left_px = shift.displacement_px - basis @ rest_px
-    squares = np.einsum("wa,wab,wb->w", left_px, shift.information_per_px2, left_px)[good]
+    left = replace(shift, displacement_px=left_px)
     fitted = MOTIONS - np.trace(covariance) / prior.std_px**2
-    unlike = float(squares.sum() / max(2 * good.sum() - fitted, 1.0))
+    unlike = float(_squares(left)[good].sum() / max(2 * good.sum() - fitted, 1.0))
     values, vectors = np.linalg.eigh(covariance)
     return Rigid(
-        replace(shift, displacement_px=left_px),
+        left,
         good,
         taken_px + rest_px,
         max(1.0, unlike) ** 0.5 * vectors * np.sqrt(np.maximum(values, 0.0)),
@@ -175,6 +174,12 @@ def _fitted(
         *_alike(shift, left_px, good, optics),
         float(np.sqrt(np.mean((basis[good] @ (taken_px + rest_px)) ** 2))),
     )
+
+
+def _squares(shift: ShiftMeasurement) -> Float[np.ndarray, " windows"]:
+    """Of each window its shift's square over its noise: chi-squared of two numbers where it did not move."""
+    shifts = shift.displacement_px
+    return np.einsum("wa,wab,wb->w", shifts, shift.information_per_px2, shifts)
 
 
 def believed(read: Rigid, prior: MotionPrior, optics: Optics) -> Rigid:
