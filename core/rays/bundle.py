@@ -44,14 +44,19 @@ def walk(rays: Rays, along_m: Float[Array, " rays"]) -> Components:
     return x + along_m * dx, y + along_m * dy, z + along_m * dz
 
 
+def corners_m(room: Box) -> Float[Array, "2 3"]:
+    """The room's lower and upper corner: an argument by which one program serves every room."""
+    return jnp.asarray([room.lower_m, room.upper_m])
+
+
 def clip_ray(
-    room: Box, origin_m: Float[Array, "3"], direction: Float[Array, "3"]
+    corners_m: Float[Array, "2 3"], origin_m: Float[Array, "3"], direction: Float[Array, "3"]
 ) -> tuple[Float[Array, "3"], Float[Array, ""], Int[Array, ""]]:
     """Entry [m], length in the room [m] and outcome of one ray (slab method).
 
     A ray along a face counts as inside; one that starts inside enters where it starts.
     """
-    lower, upper = jnp.asarray(room.lower_m, origin_m.dtype), jnp.asarray(room.upper_m, origin_m.dtype)
+    lower, upper = corners_m
     # Along an axis that the ray does not move on, it is inside for ever or never: no 0 / 0 on a face.
     parallel = jnp.abs(direction) < jnp.finfo(direction.dtype).tiny
     within = jnp.where((origin_m >= lower) & (origin_m <= upper), -jnp.inf, jnp.inf)

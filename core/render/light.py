@@ -32,7 +32,7 @@ class TextureMap(AbstractPatternMap):
     """A print or screen that fills the wall, pattern row 0 at its top, column 0 at small x."""
 
     left_top_m: Float[Array, "2"]
-    pixel_m: float = eqx.field(static=True)
+    pixel_m: Float[Array, ""]
 
     def coordinate_px(self, wall_point_m: Float[Array, "3"]) -> Float[Array, "2"]:
         """Pattern coordinate of a wall point."""
@@ -62,7 +62,7 @@ def pattern_map(scene: Scene) -> AbstractPatternMap:
     """The map of the scene's light, in JAX's widest enabled float."""
     if isinstance(scene.light, FixedTexture):
         corner = np.array([scene.room.lower_m[0], scene.room.upper_m[2]])
-        return TextureMap(jnp.asarray(corner), scene.light.pixel_m)
+        return TextureMap(jnp.asarray(corner), jnp.asarray(np.array(scene.light.pixel_m)))
     return ProjectorMap(pinhole(scene.light.projector))
 
 

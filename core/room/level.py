@@ -13,7 +13,9 @@ from core.room.room_grid import AXES, Cells, cut, face_mean
 from core.room.step import Flow, RoomModel
 
 
-def level_correction(flow: Flow, warming_k_s: Cells, model: RoomModel, ahead_s: float) -> Float[Array, " nz"]:
+def level_correction(
+    flow: Flow, warming_k_s: Cells, model: RoomModel, ahead_s: Float[Array, ""]
+) -> Float[Array, " nz"]:
     """What to add to the temperature of each layer [K] of a room that warms by `warming_k_s`.
 
     The uniform part is added whole. Differences between layers, which internal waves disturb, are added as far as

@@ -138,7 +138,12 @@ def _after_window(
     if change < settings.tolerance and model_s > settings.least_s - 1e-6:
         outcome = Outcome.converged
     elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
-        flow = _levelled(flow, (flow.excess_k - start.excess_k) / lived_s, model, settings.level_ahead_s)
+        flow = _levelled(
+            flow,
+            (flow.excess_k - start.excess_k) / lived_s,
+            model,
+            jnp.asarray(settings.level_ahead_s, jnp.float32),
+        )
     # Only the last fifth is needed, whenever the march ends.
     means = (*state.means, mean)[-_fifth(windows) :]
     steps = state.steps + taken
@@ -209,7 +214,7 @@ def _filled(flow: Flow, model: RoomModel) -> Flow:
 
 
 @eqx.filter_jit
-def _levelled(flow: Flow, warming_k_s: Cells, model: RoomModel, ahead_s: float) -> Flow:
+def _levelled(flow: Flow, warming_k_s: Cells, model: RoomModel, ahead_s: Float[Array, ""]) -> Flow:
     return _shifted(flow, level_correction(flow, warming_k_s, model, ahead_s))
 
 
