@@ -24,14 +24,13 @@ from jaxtyping import Float
 from scipy.linalg import block_diag
 from scipy.optimize import minimize
 
-from core.data_error import independent_share
 from core.estimate.least_squares import spread
 from core.estimate.observation import IMAGES, OUTLETS, PLANES, SENSORS, Observations, ShiftBlocks
 from core.geometry import face_of
 from core.room.vertices import linear_matrix
 
-# So many neighbouring data have the model's error alike. Fewer than in the fit of the parameters
-# (`core.data_error`): what neighbours have wrong in common is what the correction is to take up.
+# So many neighbouring data count as one. Fewer than in the fit of the parameters (`core.data_error`): what
+# neighbours have wrong in common is what the correction is to take up.
 _CORRELATED = 4.0
 # Basis functions along x and z.
 _LATTICE = (9, 11)
@@ -63,7 +62,7 @@ class _Residuals(eqx.Module):
     """Residuals of one kind, derivatives in the coefficients and the planes' layers, and errors that they share.
 
     `start` is the kind's error beyond noise from which the search begins; None: thermometers, which read one point
-    where the correction is a mean along y. `count` is the share of the data that counts.
+    where the correction is a mean along y.
     """
 
     residual: Float[np.ndarray, " data"]
@@ -71,7 +70,6 @@ class _Residuals(eqx.Module):
     design: Float[np.ndarray, "data unknowns"]
     shared: Float[np.ndarray, "data errors"]
     start: float | None
-    count: float
 
 
 class _Fitted(eqx.Module):
@@ -150,8 +148,7 @@ def _kinds(
             least = 0.01 * float(np.sqrt(np.median(variance[own])))
             start = max(0.5 * spread(own_errors[own]), least) if g in (IMAGES, PLANES) else None
             noise = variance[own] + (outlet_std_k**2 if g == OUTLETS else 0.0)
-            count = 1.0 if start is None else independent_share(own_errors[own], noise, _CORRELATED)
-            found.append(_Residuals(residual[own], noise, unknowns, common, start, count))
+            found.append(_Residuals(residual[own], noise, unknowns, common, start))
     return found
 
 
@@ -189,12 +186,14 @@ def _fit(
     errors: list[float],
     point_k2: float,
 ) -> _Fitted:
-    """Linear least squares: normal residuals, of which the share `count` of each kind counts."""
+    """Linear least squares: normal residuals, of which `_CORRELATED` of a pooled kind count as one."""
     known = np.linalg.inv(prior)
     gained, unlikely, left = np.zeros(len(known)), 0.0, iter(errors)
     for kind in kinds:
-        variance = kind.noise + (point_k2 if kind.start is None else next(left) ** 2)
-        root = np.sqrt(kind.count / variance)[:, None]
+        pooled = kind.start is not None
+        variance = kind.noise + (next(left) ** 2 if pooled else point_k2)
+        count = 1.0 / _CORRELATED if pooled else 1.0
+        root = np.sqrt(count / variance)[:, None]
         # What is shared is marginalised (`core.motion`).
         along, size, _ = np.linalg.svd(root * kind.shared, full_matrices=False)
         share = 1.0 - 1.0 / np.sqrt(1.0 + size**2)
@@ -202,7 +201,7 @@ def _fit(
         design, residual = (of - (along * share) @ (along.T @ of) for of in (design, residual))
         known = known + design.T @ design
         gained = gained + design.T @ residual
-        unlikely += kind.count * float(np.log(variance).sum()) + float(
+        unlikely += count * float(np.log(variance).sum()) + float(
             np.log1p(size**2).sum() + residual @ residual
         )
     covariance = np.linalg.inv(known)

@@ -1,9 +1,9 @@
 """One Gauss-Newton step on a room's uncertain parameters, with a Jacobian from a coarser room.
 
-    minimise  |d - f(q)|^2 / (s^2 + c r^2)  +  sum log(1 + q^2 / nu) (nu + 1),  nu = 3
+    minimise  |d - f(q)|^2 / (s^2 + r^2) / c  +  sum log(1 + q^2 / nu) (nu + 1),  nu = 3
 
 q are the parameters in units of their prior deviations. s is each datum's noise; r is the representation
-error, estimated for each kind of data; c is the number of neighbouring data that have it alike.
+error, estimated for each kind of data; c is the number of neighbouring data whose errors are correlated.
 The prior is Student's t, so that the data can overrule an entry that is wrong by many deviations. The closure's
 viscosity, which nobody enters, has a Gaussian prior: with a Student's t it would move in place of a wrong supply.
 """
@@ -85,7 +85,7 @@ def weighted_variance(
     *,
     far: bool = False,
 ) -> Float[np.ndarray, " data"]:
-    """Noise of each datum, and representation error times the number of neighbours that have it alike.
+    """Noise plus representation error of each datum, times the number of correlated neighbours.
 
     The representation error of a kind of data is the difference of two grids, or the misfit if that is smaller.
     With `far` the images' whole misfit counts as representation error: far from the truth their derivatives are
@@ -97,7 +97,7 @@ def weighted_variance(
         error = spread(residual[own])
         if g != IMAGES or not far:
             error = min(error, spread(grid_difference[own]))
-        total[own] = variance[own] + error**2 * (CORRELATED_DATA if g in (IMAGES, PLANES) else 1.0)
+        total[own] = (variance[own] + error**2) * (CORRELATED_DATA if g in (IMAGES, PLANES) else 1.0)
     return total
 
 

@@ -23,7 +23,7 @@ from scipy import ndimage
 from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 
-from core.data_error import CORRELATED_DATA, independent_share
+from core.data_error import CORRELATED_DATA
 from core.estimate.discrepancy import LENGTH_SHARE
 from core.estimate.forward_runs import Derivatives
 from core.estimate.image_noise import images, unshared
@@ -122,7 +122,7 @@ def size_of(
     """The likeliest k, from what a room leaves of the images and their noise's variance; 1 without images."""
     if not len(left):
         return 1.0
-    independent = len(left) * independent_share(left, noise, CORRELATED_DATA)
+    independent = len(left) / CORRELATED_DATA
     power, noise_power, unit = np.mean(left**2), np.mean(noise), _unit_power(apart)
 
     def unlikely(log_size: float) -> float:

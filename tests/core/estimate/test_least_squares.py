@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
 
-from core.data_error import independent_share
 from core.estimate.least_squares import gauss_newton, weighted_variance
-from core.estimate.observation import IMAGES
 from core.estimate.parameter_step import secant
 
 
@@ -73,15 +71,3 @@ def test_far_from_the_truth_a_thermometer_holds_against_images_that_the_room_doe
 
     assert step(far=False) > -1.0
     assert step(far=True) == pytest.approx(-2.0, abs=0.1)
-
-
-def test_each_datum_has_its_own_noise_and_neighbours_share_what_the_model_has_wrong():
-    noise = np.full(1000, 4.0)
-    draw = np.random.default_rng(0)
-    assert independent_share(2.0 * draw.standard_normal(1000), noise, 12.0) > 0.5
-    assert independent_share(np.full(1000, 200.0), noise, 12.0) == pytest.approx(1 / 12, rel=2e-3)
-    assert independent_share(np.zeros(1000), noise, 12.0) == 1.0
-    # Where two grids agree, images scatter by their noise alone.
-    group, nothing = np.full(1000, IMAGES), np.zeros(1000)
-    np.testing.assert_allclose(weighted_variance(noise, group, np.full(1000, 9.0), nothing), noise)
-    np.testing.assert_allclose(weighted_variance(noise, group, np.full(1000, 9.0), np.full(1000, 0.5)), 7.0)
