@@ -8,6 +8,7 @@ Cost: a few Cholesky factors of 770 unknowns.
 
 from dataclasses import dataclass
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -73,8 +74,6 @@ def rows_of(scene: Scene, view: int, flow: ExpectedFlow, found: Signal) -> Float
 
 def _columns(operator, size: int):
     """Displacements by a unit at each vertex."""
-    import jax
-
     basis = jnp.eye(size, dtype=jnp.float32).reshape(size, *_SHAPE)
     return jax.lax.map(operator.apply, basis)
 

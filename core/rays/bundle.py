@@ -44,8 +44,8 @@ def walk(rays: Rays, along_m: Float[Array, " rays"]) -> Components:
     return x + along_m * dx, y + along_m * dy, z + along_m * dz
 
 
-def corners_m(room: Box) -> Float[Array, "2 3"]:
-    """The room's lower and upper corner: an argument by which one program serves every room."""
+def corners_of(room: Box) -> Float[Array, "2 3"]:
+    """The room's lower and upper corner. As an array they are no part of a compiled program: one serves all rooms."""
     return jnp.asarray([room.lower_m, room.upper_m])
 
 

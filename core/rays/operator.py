@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from core.geometry import Box
-from core.rays.bundle import RayOutcome, clip_ray, corners_m
+from core.rays.bundle import RayOutcome, clip_ray, corners_of
 from core.rays.gathered import gathered_paths
 from core.rays.optics import Pinhole, pinhole
 from core.rays.paths import AbstractWallPaths, Fan
@@ -81,12 +81,12 @@ def build(
     turn = turn_of(scene, view)
     scene, own = facing(scene, view)
     with jax.enable_x64(True):
-        lens, corners = pinhole(scene.views[own].camera), corners_m(scene.room)
-        points_m, px_per_m, seen = map(np.asarray, _wall(corners, lens, jnp.asarray(pixels, jnp.float64)))
+        lens, corners_m = pinhole(scene.views[own].camera), corners_of(scene.room)
+        points_m, px_per_m, seen = map(np.asarray, _wall(corners_m, lens, jnp.asarray(pixels, jnp.float64)))
         origins_m = [np.asarray(lens.position_m)]
         if isinstance(scene.light, ProjectedPattern):
             origins_m.append(np.array(scene.light.projector.position_m, float))
-            seen = seen & np.asarray(_reaches(corners, jnp.asarray(origins_m[1]), jnp.asarray(points_m)))
+            seen = seen & np.asarray(_reaches(corners_m, jnp.asarray(origins_m[1]), jnp.asarray(points_m)))
     footprint_m = window_px / np.median(np.abs(px_per_m[:, [0, 1], [0, 1]]), axis=0)
     paths = [_paths(scene.room, turn.shape(shape), Fan(o, points_m), footprint_m, seen) for o in origins_m]
     # The pattern moves against the shift of the point that is seen.
@@ -108,22 +108,24 @@ def _paths(
 @eqx.filter_jit
 @partial(jax.vmap, in_axes=(None, None, 0))
 def _wall(
-    corners: Float[Array, "2 3"], lens: Pinhole, pixel: Float[Array, "2"]
+    corners_m: Float[Array, "2 3"], lens: Pinhole, pixel: Float[Array, "2"]
 ) -> tuple[Array, Array, Array]:
     """Wall point of a pixel, d pixel / d (x, z) on the wall, and whether it is on the wall."""
     direction = lens.direction(pixel)
-    _, _, outcome = clip_ray(corners, lens.position_m, direction)
+    _, _, outcome = clip_ray(corners_m, lens.position_m, direction)
     seen = outcome == RayOutcome.wall
     forward = jnp.where(seen, direction[1], 1.0)
-    point_m = lens.position_m + (corners[1, 1] - lens.position_m[1]) / forward * direction
+    point_m = lens.position_m + (corners_m[1, 1] - lens.position_m[1]) / forward * direction
     # Any point of the wall stands in for a pixel that misses it: its weights are zero.
-    point_m = jnp.where(seen, point_m, corners[1])
+    point_m = jnp.where(seen, point_m, corners_m[1])
     return point_m, jax.jacfwd(lens.project)(point_m)[:, jnp.asarray([0, 2])], seen
 
 
 @eqx.filter_jit
 @partial(jax.vmap, in_axes=(None, None, 0))
-def _reaches(corners: Float[Array, "2 3"], origin_m: Float[Array, "3"], point_m: Float[Array, "3"]) -> Array:
+def _reaches(
+    corners_m: Float[Array, "2 3"], origin_m: Float[Array, "3"], point_m: Float[Array, "3"]
+) -> Array:
     towards = point_m - origin_m
-    _, _, outcome = clip_ray(corners, origin_m, towards / jnp.linalg.norm(towards))
+    _, _, outcome = clip_ray(corners_m, origin_m, towards / jnp.linalg.norm(towards))
     return outcome == RayOutcome.wall

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from core.rays.bundle import RayOutcome, Rays, clip_ray, corners_m
+from core.rays.bundle import RayOutcome, Rays, clip_ray, corners_of
 from core.rays.optics import Pinhole, pinhole
 from core.render.light import AbstractPatternMap, ProjectorMap, coordinate_jacobian, pattern_map
 from core.scene import Scene
@@ -58,7 +58,7 @@ def pixel_geometry(
         )
     with jax.enable_x64(True):
         return _batch(
-            corners_m(scene.room),
+            corners_of(scene.room),
             pinhole(scene.views[view].camera),
             pattern_map(scene),
             jnp.asarray(np.asarray(pixels, np.float64)),
@@ -68,36 +68,36 @@ def pixel_geometry(
 
 @eqx.filter_jit
 def _batch(
-    corners: Float[Array, "2 3"],
+    corners_m: Float[Array, "2 3"],
     lens: Pinhole,
     light: AbstractPatternMap,
     pixels: Float[Array, "rays 2"],
     lens_point_m: Float[Array, "2"],
 ) -> PixelGeometry:
-    wide = jax.vmap(lambda pixel: _one(corners, lens, light, pixel, lens_point_m))(pixels)
+    wide = jax.vmap(lambda pixel: _one(corners_m, lens, light, pixel, lens_point_m))(pixels)
     return jax.tree.map(lambda a: a.astype(jnp.float32 if eqx.is_inexact_array(a) else jnp.int32), wide)
 
 
 def _one(
-    corners: Float[Array, "2 3"],
+    corners_m: Float[Array, "2 3"],
     lens: Pinhole,
     light: AbstractPatternMap,
     pixel: Float[Array, "2"],
     lens_point_m: Float[Array, "2"],
 ) -> PixelGeometry:
     direction = lens.direction(pixel)
-    point_m, range_m = _wall_point(corners, lens, pixel)
+    point_m, range_m = _wall_point(corners_m, lens, pixel)
     eye_m = lens.position_m + lens_point_m @ lens.rotation[:2]
     towards = range_m * direction - lens_point_m @ lens.rotation[:2]
-    camera = Rays(*_clipped(corners, eye_m, towards / jnp.linalg.norm(towards)))
+    camera = Rays(*_clipped(corners_m, eye_m, towards / jnp.linalg.norm(towards)))
     coordinate = light.coordinate_px(point_m)
     cell = jnp.round(coordinate)
-    nearest_m = corners[1, 1] - lens.position_m[1]
+    nearest_m = corners_m[1, 1] - lens.position_m[1]
     projector, projector_range_m, lit = None, None, camera.outcome == RayOutcome.wall
     if isinstance(light, ProjectorMap):
         towards = point_m - light.optics.position_m
         projector_range_m = jnp.linalg.norm(towards)
-        projector = Rays(*_clipped(corners, light.optics.position_m, towards / projector_range_m))
+        projector = Rays(*_clipped(corners_m, light.optics.position_m, towards / projector_range_m))
         lit = lit & (projector.outcome == RayOutcome.wall) & (light.optics.depth_m(point_m) > 0)
     limit = 2**30
     return PixelGeometry(
@@ -107,7 +107,7 @@ def _one(
         pattern_from_wall=jnp.where(lit, coordinate_jacobian(light, point_m), 0.0),
         depth_slope=jnp.where(lit, light.depth_slope(point_m), 0.0),
         pattern_from_pixel=jnp.where(
-            lit, jax.jacfwd(lambda p: light.coordinate_px(_wall_point(corners, lens, p)[0]))(pixel), 0.0
+            lit, jax.jacfwd(lambda p: light.coordinate_px(_wall_point(corners_m, lens, p)[0]))(pixel), 0.0
         ),
         weight=jnp.where(lit, direction[1] * nearest_m / range_m, 0.0),
         projector=projector,
@@ -116,17 +116,17 @@ def _one(
 
 
 def _clipped(
-    corners: Float[Array, "2 3"], origin_m: Float[Array, "3"], direction: Float[Array, "3"]
+    corners_m: Float[Array, "2 3"], origin_m: Float[Array, "3"], direction: Float[Array, "3"]
 ) -> tuple:
-    entry_m, length_m, outcome = clip_ray(corners, origin_m, direction)
+    entry_m, length_m, outcome = clip_ray(corners_m, origin_m, direction)
     return entry_m, direction, length_m, outcome
 
 
 def _wall_point(
-    corners: Float[Array, "2 3"], lens: Pinhole, pixel: Float[Array, "2"]
+    corners_m: Float[Array, "2 3"], lens: Pinhole, pixel: Float[Array, "2"]
 ) -> tuple[Float[Array, "3"], Float[Array, ""]]:
     """Point on the wall's plane and the distance to it; a stand-in for a ray that looks away."""
     direction = lens.direction(pixel)
     forward = jnp.where(direction[1] > 1e-9, direction[1], 1.0)
-    range_m = (corners[1, 1] - lens.position_m[1]) / forward
+    range_m = (corners_m[1, 1] - lens.position_m[1]) / forward
     return lens.position_m + range_m * direction, range_m

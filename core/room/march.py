@@ -138,12 +138,9 @@ def _after_window(
     if change < settings.tolerance and model_s > settings.least_s - 1e-6:
         outcome = Outcome.converged
     elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
-        flow = _levelled(
-            flow,
-            (flow.excess_k - start.excess_k) / lived_s,
-            model,
-            jnp.asarray(settings.level_ahead_s, jnp.float32),
-        )
+        # As an array the time ahead is no part of the compiled program.
+        ahead_s = jnp.asarray(settings.level_ahead_s, jnp.float32)
+        flow = _levelled(flow, (flow.excess_k - start.excess_k) / lived_s, model, ahead_s)
     # Only the last fifth is needed, whenever the march ends.
     means = (*state.means, mean)[-_fifth(windows) :]
     steps = state.steps + taken

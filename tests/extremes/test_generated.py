@@ -14,7 +14,7 @@ from core.fields import GridField
 from core.geometry import Box, looking_along_y
 from core.losses.boussinesq import scales
 from core.rays import NonlinearTracer, Rays
-from core.rays.bundle import clip_ray, corners_m
+from core.rays.bundle import clip_ray, corners_of
 from core.scene import FixedTexture, Inlet, Patch, Scene, View
 from core.setting import SettingError
 
@@ -94,7 +94,7 @@ def bent_by_noise():
     def run(origin_m, points_m):
         towards = points_m - origin_m[None]
         direction = towards / jnp.maximum(jnp.linalg.norm(towards, axis=1, keepdims=True), 1e-30)
-        entry, length, outcome = jax.vmap(lambda d: clip_ray(corners_m(room), origin_m, d))(direction)
+        entry, length, outcome = jax.vmap(lambda d: clip_ray(corners_of(room), origin_m, d))(direction)
         bend = NonlinearTracer(16, 2.7e-4).bend(Rays(entry, direction, length, outcome), field)
         return entry, length, bend.wall_shift_m, bend.outcome
 

@@ -7,7 +7,7 @@ import numpy as np
 from core.air import Air
 from core.geometry import Box
 from core.rays import Rays
-from core.rays.bundle import clip_ray, corners_m
+from core.rays.bundle import clip_ray, corners_of
 
 ROOM = Box(lower_m=(-1.2, -1.5, 0.0), upper_m=(2.9, 1.5, 3.0))
 AIR = Air()
@@ -19,7 +19,7 @@ def rays_from(origin_m, points_m, room: Box = ROOM) -> Rays:
     origin = jnp.asarray(np.asarray(origin_m, float))
     towards = jnp.asarray(np.asarray(points_m, float)) - origin[None]
     direction = towards / jnp.linalg.norm(towards, axis=1, keepdims=True)
-    entry, length, outcome = jax.vmap(lambda d: clip_ray(corners_m(room), origin, d))(direction)
+    entry, length, outcome = jax.vmap(lambda d: clip_ray(corners_of(room), origin, d))(direction)
     return Rays(entry, direction, length, outcome)
 
 
