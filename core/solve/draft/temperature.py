@@ -34,6 +34,7 @@ from core.scene import ProjectedPattern
 from core.setting import SettingError
 from core.solve.draft.conjugate_gradients import Product, conjugate_gradients
 from core.solve.draft.front_layers import front_layers_px
+from core.solve.draft.stratification import upside_down
 from core.solve.draft.temperature_deviation import deviation
 from core.solve.draft.temperature_prior import (
     TemperatureSettings,
@@ -98,6 +99,9 @@ def solve_temperature(
 
     std = deviation(doubted, drawn, settings.draws, seed=0)
     temperature = _kelvin(air, n)
+    turned = upside_down(
+        temperature, doubted, lambda rhs: _solved(doubted, rough, rhs, _DRAWN, settings, watch)[0]
+    )
     # dT = (T / T0)^2 dn T0 / N0.
     std_k = std / system.per_k * (temperature / air.ambient_temperature_k) ** 2
     x, y, z = grid.axes_m
@@ -114,6 +118,7 @@ def solve_temperature(
             "Temperature only: velocity and pressure are not solved for by this preset.",
             "What varies along the line of sight comes from the prior, not from the images.",
             *left_out(moved),
+            *turned,
             *([_NOT_AIR] if (n < _thinnest(air) - air.ambient_refractivity).any() else []),
         ),
     )

@@ -1,5 +1,6 @@
 """The level of the temperature where no plane is known: an outlet's thermometer carries it, on any grid."""
 
+import re
 from dataclasses import replace
 
 import jax.numpy as jnp
@@ -56,6 +57,22 @@ def test_the_level_of_a_draft_does_not_depend_on_the_number_of_cells(measured):
         assert level_k == pytest.approx(295.2, abs=0.03)
         # The outlet is known to 0.5 K, and so is every temperature.
         assert 0.2 < np.mean(found.temperature_std_k) < 1.0
+
+
+def test_swapped_pictures_show_air_that_lies_upside_down(measured):
+    swapped = replace(measured, displacement_px=-measured.displacement_px)
+    said, unsaid = (" ".join(solve_draft(Problem(SCENE, (shift,))).notes) for shift in (swapped, measured))
+    fall_k = float(re.findall(r"it falls by ([\d.]+) K", said)[0])
+    assert fall_k == pytest.approx(0.6, abs=0.2)  # towards the prior, in which air gets warmer upwards
+    assert "may be swapped" in said
+    assert "swapped" not in unsaid
+
+
+def test_noise_alone_is_not_taken_for_air_that_lies_upside_down(measured):
+    for seed in range(10):
+        noise = 1e-4 * np.random.default_rng(seed).standard_normal(measured.displacement_px.shape)
+        shift = replace(measured, displacement_px=noise)
+        assert "swapped" not in " ".join(solve_draft(Problem(SCENE, (shift,))).notes)
 
 
 @pytest.mark.parametrize(("seen", "left_over"), [(False, 1e-4), (True, 0.02)], ids=["outlet", "images"])

@@ -1,0 +1,37 @@
+"""Whether the air that `draft` finds lies the wrong way up: warm below cold, as the air of no room stays for long."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from core.solve.draft.temperature_system import System, Volume
+
+# Of air that is equally warm at all heights one room in twenty is said to lie the wrong way up; one-sided.
+_SURE = 1.645
+
+
+def upside_down(temperature_k: Volume, system: System, solve: Callable[[Volume], Volume]) -> list[str]:
+    """A sentence if the temperature falls with height by more than its deviation allows.
+
+    `solve` inverts the Hessian of `system`, in which the deviation is counted.
+    """
+    slope = _rise_of(system)
+    rise_k = float(np.sum(slope * temperature_k))
+    if rise_k >= 0.0:
+        return []
+    std_k = float(np.sqrt(np.sum(slope * solve(slope)))) / system.per_k
+    if rise_k > -_SURE * std_k:
+        return []
+    return [
+        f"The air found is warmer below than above: it falls by {-rise_k:.2f} K from floor to ceiling "
+        f"(deviation {std_k:.2f} K). Such air would turn over within minutes. Reference and flow may be swapped: "
+        "check which picture was taken with the air moving."
+    ]
+
+
+def _rise_of(system: System) -> Volume:
+    """The field whose product with a temperature is its rise from floor to ceiling, by least squares over height."""
+    shape = system.grid.shape
+    height = np.linspace(-0.5, 0.5, shape[2])
+    rise = height / (np.sum(height**2) * shape[0] * shape[1])
+    return np.broadcast_to(rise, shape).copy()
