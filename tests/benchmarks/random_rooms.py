@@ -9,6 +9,7 @@ number for figures; from 1000 on they are for nobody to look at.
 
     python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32] [--by openfoam]
     python -m tests.benchmarks.random_rooms FOLDER --summary
+    python -m tests.benchmarks.random_rooms FOLDER --stated  # everything is known, nothing is fitted
 
 Volumes and rows stay in FOLDER; a room that has its row is not fitted again.
 """
@@ -25,9 +26,12 @@ from app.bench.room_fit import fit_row, problem_of
 from app.reconstruct.problem import with_scene
 from app.volume.file import read_volume
 from app.volume.misread import misread
-from app.volume.scene import heater_of
-from core.metrics import inner
+from app.volume.scene import RigOptions, heater_of, room_scene
+from core.estimate.prior import room_prior
+from core.metrics import inner, rms
 from core.problem import Problem
+from core.room.forward import room, room_fields
+from core.room.march import MarchSettings, march
 from core.solve.room import RoomSettings
 from tests.benchmarks.foam_rooms import MODELS, computed
 from tests.benchmarks.other_rooms import T0_K, Made, marched
@@ -133,6 +137,32 @@ def row_of(folder: Path, number: int, cells: int, by: str) -> dict[str, Any]:
     }
 
 
+def stated_row(folder: Path, number: int, cells: int, by: str) -> dict[str, Any]:
+    """How far off a march is with everything stated as it is, under either closure, and nothing fitted.
+
+    What is left is the closure's, the grid's, and the truth's own, which may still move (`truth_moves`: how far the
+    mean over its first half is from the mean over all, over its rms).
+    """
+    path, what = made(folder, number, by), drawn(number)
+    volume, truth = read_volume(path), json.loads(path.with_suffix(".json").read_text())
+    row = {"room": number, "truth": truth["closure"], "cells": cells, "truth_moves": truth.get("change_u")}
+    scene = room_scene(volume, RigOptions(), "surveyed")
+    for closure in ("k_epsilon", "zero_equation"):
+        forward = room(scene, cells, closure)
+        model = forward.model(room_prior(Problem(scene, (), ()), forward.layout).mean)
+        excess_k = 0.5 * float(np.mean([inlet["dT"] for inlet in what.inlets]))
+        rest = forward.at_rest(model, np.full(forward.grid.cells[2], excess_k))
+        found = march(rest, model, MarchSettings(longest_s=what.settle_s))
+        field = room_fields(found.mean, model, forward.layout, what.vertices)
+        u_m_s = inner(volume.velocity_m_s)
+        off_k = inner(field.excess_k + volume.ambient_k - volume.temperature_k)
+        row |= {
+            f"u_rel_{closure}": rms(inner(field.velocity_m_s) - u_m_s) / rms(u_m_s),
+            f"T_rms_k_{closure}": rms(off_k),
+        }
+    return row
+
+
 def _entered(problem: Problem, number: int, heater: Any) -> Problem:
     """The problem as an operator enters it: the heater if it is stated, and every entry misread."""
     scene = problem.scene
@@ -175,10 +205,11 @@ def main() -> None:
     parser.add_argument("--rooms", type=int, default=12, help="every second one from --first")
     parser.add_argument("--cells", type=int, default=32)
     parser.add_argument("--by", choices=("airlens", "openfoam"), default="airlens")
+    parser.add_argument("--stated", action="store_true", help="everything stated, nothing fitted")
     parser.add_argument("--summary", action="store_true")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    rows = options.folder / "rows.jsonl"
+    rows = options.folder / ("stated.jsonl" if options.stated else "rows.jsonl")
     done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
     if options.summary:
         print(json.dumps(summary([row for row in done if row["room"] % 2])))
@@ -186,7 +217,7 @@ def main() -> None:
     for number in range(options.first, options.first + 2 * options.rooms, 2):
         if any(row["room"] == number for row in done):
             continue
-        row = row_of(options.folder, number, options.cells, options.by)
+        row = (stated_row if options.stated else row_of)(options.folder, number, options.cells, options.by)
         with rows.open("a") as file:
             file.write(json.dumps(row) + "\n")
         print(json.dumps(row), flush=True)
