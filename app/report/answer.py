@@ -17,6 +17,8 @@ from core.scene import PointSensors, Wall
 
 # A camera of fewer pixels, or a mean of fewer frames, sees less than a usual one.
 _PIXELS, _FRAMES = 2000, 100
+# What every sentence says that bids distrust of a whole result.
+_DOUBTS = ("distrust", "may be swapped")
 
 
 def summary(finding: Finding) -> tuple[str, ...]:
@@ -138,7 +140,7 @@ def _advice(finding: Finding) -> Iterable[str]:
     solution, scene = finding.solution, finding.experiment.settings.scene
     if solution.outcome in (Outcome.step_limit, Outcome.time_limit, Outcome.nonfinite):
         yield f"The solve did not come to its end. {solution.outcome.value}"
-    yield from (note for note in finding.manifest.get("assumed", ()) if "istrust" in note)
+    yield from doubts(finding.manifest.get("assumed", ()))
     yield from _unstated(found_in(finding.manifest))
     if solution.velocity_m_s is None:
         yield "Reconstruct with the preset standard: it finds the velocity as well."
@@ -158,6 +160,11 @@ def _advice(finding: Finding) -> Iterable[str]:
             f"Solve on a finer grid than {scene.solve.grid} cells (scene.solve.grid, or the preset reference): "
             "a coarse one smears the jet."
         )
+
+
+def doubts(sentences: Iterable[str]) -> tuple[str, ...]:
+    """Of what a result says, what must be looked into before it is believed."""
+    return tuple(one for one in sentences if any(word in one for word in _DOUBTS))
 
 
 def _unstated(things: Sequence[Found]) -> Iterable[str]:

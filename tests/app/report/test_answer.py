@@ -2,8 +2,9 @@
 
 import pytest
 
-from app.report.answer import ventilates
+from app.report.answer import doubts, ventilates
 from app.report.indoor import Quantity
+from core.estimate.diagnostics import doubtful, other_way
 
 
 @pytest.mark.parametrize(
@@ -20,3 +21,8 @@ def test_a_room_is_compared_with_a_mixed_one_only_where_its_interval_says_so(val
     told = ventilates(Quantity("efficiency", "air change efficiency", "%", value, low, high))
     assert words in told
     assert "mixed: 50 %" in told
+
+
+def test_what_bids_distrust_of_a_result_is_told_before_all_other_advice():
+    said = (*doubtful(0.2), *doubtful(0.7), *other_way(0.1), *other_way(-0.8), "No still border was found.")
+    assert doubts(said) == (*doubtful(0.7), *other_way(-0.8))
