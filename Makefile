@@ -19,11 +19,11 @@ setup: .venv/.installed
 demo: setup
 	$(BIN)/airlens demo
 
-# One worker more than cores: tests wait for browsers, devices and other processes a quarter of their time.
+# Two workers more than cores: tests wait for browsers, devices and other processes a quarter of their time.
 # One thread of BLAS each: on a busy core two wait for one another, ten times as long as they work.
 test: export OPENBLAS_NUM_THREADS := 1
 test: setup chromium
-	$(BIN)/python -m pytest -n $$(($(CORES) + 1)) --dist loadscope
+	$(BIN)/python -m pytest -n $$(($(CORES) + 2)) --dist loadscope
 
 # Debian's browser for the tests of the page; where it cannot be installed they are skipped and say so.
 chromium:
