@@ -138,9 +138,9 @@ def _sure(finding: Finding) -> str:
 
 def _advice(finding: Finding) -> Iterable[str]:
     solution, scene = finding.solution, finding.experiment.settings.scene
+    yield from doubts(finding.manifest.get("assumed", ()))
     if solution.outcome in (Outcome.step_limit, Outcome.time_limit, Outcome.nonfinite):
         yield f"The solve did not come to its end. {solution.outcome.value}"
-    yield from doubts(finding.manifest.get("assumed", ()))
     yield from _unstated(found_in(finding.manifest))
     if solution.velocity_m_s is None:
         yield "Reconstruct with the preset standard: it finds the velocity as well."

@@ -4,6 +4,7 @@ import equinox as eqx
 import numpy as np
 from scipy.stats import norm
 
+from core.data_error import CORRELATED_DATA
 from core.estimate.image_noise import images
 from core.estimate.observation import Observations
 from core.room.vertices import RoomFields
@@ -76,7 +77,17 @@ def explained(data: Observations, fields: RoomFields) -> Explained:
 
 
 def likeness(data: Observations, fields: RoomFields) -> float:
-    """Correlation of the measured shifts with what these fields show, -1 to 1; 0 where there are no images."""
+    """Correlation of the measured signal with what these fields show, -1 to 1.
+
+    Noise is taken out of the signal's size. 0 where there are no images, and where noise alone correlates as much in
+    one picture of twenty.
+    """
+    if not data.shifts:
+        return 0.0
     seen = images(data, fields)
-    size = float(np.linalg.norm(seen.values_px) * np.linalg.norm(seen.predicted_px))
-    return float(seen.values_px @ seen.predicted_px) / max(size, float(np.finfo(np.float32).tiny))
+    product = float(seen.values_px @ seen.predicted_px)
+    by_noise = float(np.sqrt(CORRELATED_DATA * np.sum(seen.variance_px2 * seen.predicted_px**2)))
+    if abs(product) <= float(norm.ppf(1.0 - _FALSE_ALARMS)) * by_noise:
+        return 0.0
+    signal = explained(data, fields).measured_px * np.sqrt(len(seen.values_px))
+    return float(np.clip(product / (signal * np.linalg.norm(seen.predicted_px)), -1.0, 1.0))

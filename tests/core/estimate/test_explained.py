@@ -80,6 +80,19 @@ def test_pictures_that_went_the_other_way_are_told_and_those_of_noise_are_not():
     assert not other_way(likeness(right, room_of(3.0)))
     assert "swapped" in other_way(likeness(right, room_of(-3.0)))[0]
     assert not other_way(likeness(noise, room_of(-3.0)))
+    assert likeness(observations(Problem(right.scene, ()), VERTICES), room_of(3.0)) == 0.0
+
+
+def test_noise_takes_nothing_from_how_alike_pictures_and_room_are_but_makes_it_unsure():
+    faint = observations(seen(4.0, 1.0, window_px=8), VERTICES)
+    # As they are, noise and all, they correlate by -0.72.
+    assert likeness(faint, room_of(-3.0)) < -0.8
+
+    alarms = sum(
+        bool(other_way(likeness(observations(seen(4.0, 300.0, seed, window_px=8), VERTICES), room_of(-3.0))))
+        for seed in range(20)
+    )
+    assert alarms <= 1
 
 
 @pytest.mark.parametrize(
