@@ -1,4 +1,4 @@
-"""The answer of a report: three sentences without jargon, and what would make it surer."""
+"""The answer of a report: a few sentences without jargon, and what would make it surer."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,13 +17,16 @@ from core.scene import PointSensors, Wall
 
 # A camera of fewer pixels, or a mean of fewer frames, sees less than a usual one.
 _PIXELS, _FRAMES = 2000, 100
-# What every sentence says that bids distrust of a whole result.
-_DOUBTS = ("distrust", "may be swapped")
+# What every sentence says that bids distrust of a whole result; what explains most comes first.
+_DOUBTS = ("may be swapped", "distrust")
 
 
 def summary(finding: Finding) -> tuple[str, ...]:
-    """Three sentences: what the air is like for people, how the room is ventilated, and how sure that is."""
-    made = []
+    """Three sentences: what the air is like for people, how the room is ventilated, and how sure that is.
+
+    Before them, if there is one, the first reason not to believe them.
+    """
+    made = [f"Before you believe this: {one}" for one in _doubts_of(finding)[:1]]
     for say in (_people, _ventilation, _sure):
         try:
             made.append(say(finding))
@@ -138,7 +141,7 @@ def _sure(finding: Finding) -> str:
 
 def _advice(finding: Finding) -> Iterable[str]:
     solution, scene = finding.solution, finding.experiment.settings.scene
-    yield from doubts(finding.manifest.get("assumed", ()))
+    yield from _doubts_of(finding)[1:]
     if solution.outcome in (Outcome.step_limit, Outcome.time_limit, Outcome.nonfinite):
         yield f"The solve did not come to its end. {solution.outcome.value}"
     yield from _unstated(found_in(finding.manifest))
@@ -163,8 +166,14 @@ def _advice(finding: Finding) -> Iterable[str]:
 
 
 def doubts(sentences: Iterable[str]) -> tuple[str, ...]:
-    """Of what a result says, what must be looked into before it is believed."""
-    return tuple(one for one in sentences if any(word in one for word in _DOUBTS))
+    """Of what a result says, what must be looked into before it is believed, the most telling first."""
+    said = tuple(sentences)
+    ordered = (one for word in _DOUBTS for one in said if word in one)
+    return tuple(dict.fromkeys(ordered))
+
+
+def _doubts_of(finding: Finding) -> tuple[str, ...]:
+    return doubts(finding.manifest.get("assumed", ()))
 
 
 def _unstated(things: Sequence[Found]) -> Iterable[str]:

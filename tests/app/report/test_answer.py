@@ -23,6 +23,6 @@ def test_a_room_is_compared_with_a_mixed_one_only_where_its_interval_says_so(val
     assert "mixed: 50 %" in told
 
 
-def test_what_bids_distrust_is_picked_from_all_that_a_result_says():
+def test_what_bids_distrust_is_picked_from_all_that_a_result_says_the_most_telling_first():
     said = (*doubtful(0.2), *doubtful(0.7), *other_way(0.1), *other_way(-0.8), "No still border was found.")
-    assert doubts(said) == (*doubtful(0.7), *other_way(-0.8))
+    assert doubts(said) == (*other_way(-0.8), *doubtful(0.7))

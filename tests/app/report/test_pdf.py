@@ -11,6 +11,7 @@ from app.report.answer import advice, summary, tiles
 from app.report.finding import read_finding
 from app.report.indoor import told
 from app.report.pdf import _short, write_pdf
+from core.estimate.diagnostics import doubtful, other_way
 from tests.app.report.test_indoor import experiment  # noqa: F401
 
 
@@ -34,6 +35,14 @@ def test_the_answer_is_three_sentences_without_jargon(finding):
     assert "4.0 K warmer than at the floor" in said[1]
     assert "no truth" in said[2]
     assert not any(word in " ".join(said) for word in ("rms", "sigma", "posterior", "px"))
+
+
+def test_a_reason_not_to_believe_it_stands_before_the_answer(finding):
+    swapped, distrusted = other_way(-0.8)[0], doubtful(0.7)[0]
+    manifest = {**finding.manifest, "assumed": [distrusted, "Nothing else.", swapped]}
+    doubted = dataclasses.replace(finding, manifest=manifest)
+    assert summary(doubted) == (f"Before you believe this: {swapped}", *summary(finding))
+    assert advice(doubted) == (distrusted, *advice(finding))
 
 
 def test_where_no_velocity_was_found_the_answer_says_so(finding):
