@@ -2,7 +2,7 @@
 
 import numpy as np
 from jaxtyping import Float32
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from core.scene import CameraNoise
 
@@ -33,7 +33,7 @@ def scattered_variance(mean: Image, std: Image, frames: int, flicker: float, ste
     one brightness, so that what moves before the wall hardly counts. Source: Janesick (2007).
     """
     # The median of a chi-squared is less than its mean.
-    typical = chi2.ppf(0.5, frames - 1) / (frames - 1)
+    typical = 2.0 * gammaincinv(0.5 * (frames - 1), 0.5) / (frames - 1)
     order = np.argsort(mean, axis=None)
     level, variance = (
         np.array([np.median(part) for part in np.array_split(values.ravel()[order], _LEVELS)])

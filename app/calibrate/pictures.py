@@ -114,7 +114,7 @@ def save(file: Path, pixels: np.ndarray) -> Path:
 
     def write(temporary: Path) -> None:
         if file.suffix == ".png":
-            cv2.imwrite(str(temporary), pixels, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+            cv2.imwrite(str(temporary), pixels)
         else:
             tifffile.imwrite(temporary, pixels)
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import RegularGridInterpolator
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from app.report.indoor import LENGTH_SHARE, SAMPLE_CELLS, age_of_air
 from core.comfort import (
@@ -67,6 +67,9 @@ def _of_places(
     solution: Solution, occupant: Occupant
 ) -> dict[str, tuple[Volume, Volume | None, Volume | None]]:
     """Each map's found values, and the ends of its interval where T or u has a deviation."""
+    # Imported here: it takes half a second, and most commands draw no maps.
+    from scipy.stats import qmc
+
     velocity = np.asarray(solution.velocity_m_s, np.float64)
     found = _felt(np.asarray(solution.temperature_k, np.float64), velocity, occupant)
     if solution.temperature_std_k is None or solution.velocity_std_m_s is None:
@@ -78,7 +81,7 @@ def _of_places(
     kelvin, kelvin_std = solution.temperature_k[at], solution.temperature_std_k[at]
     speed_std = solution.velocity_std_m_s[at]
     drawn: dict[str, list[np.ndarray]] = {name: [] for name in found}
-    for draw in norm.ppf(qmc.Sobol(4, rng=np.random.default_rng(0)).random_base2(_DRAWS_LOG2)):
+    for draw in ndtri(qmc.Sobol(4, rng=np.random.default_rng(0)).random_base2(_DRAWS_LOG2)):
         felt = _felt(kelvin + draw[0] * kelvin_std, velocity[at] + draw[1:] * speed_std, occupant)
         for name, values in felt.items():
             drawn[name].append(values)

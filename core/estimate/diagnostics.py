@@ -2,7 +2,7 @@
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from core.estimate.explained import Explained
 from core.estimate.least_squares import Posterior
@@ -42,7 +42,7 @@ def contradictions(
     """
     fitted = prior.parameters(posterior.vector)
     doubt = np.sqrt(1.0 + by_closure**2)
-    limit = float(norm.ppf(1.0 - _FALSE_ALARMS / (2.0 * max(len(doubt), 1))))
+    limit = float(ndtri(1.0 - _FALSE_ALARMS / (2.0 * max(len(doubt), 1))))
     times = dict(zip(prior.names(), np.abs(posterior.vector) / doubt, strict=True))
     believed = {name: n for name, n in times.items() if n > limit and doubt_of_velocity <= _DOUBTFUL}
     inlets = [b for b in problem.scene.boundary if isinstance(b, Inlet)]

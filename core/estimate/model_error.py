@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import ndimage
 from scipy.optimize import minimize_scalar
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from core.data_error import CORRELATED_DATA
 from core.estimate.discrepancy import LENGTH_SHARE
@@ -57,7 +57,7 @@ class ModelError(eqx.Module):
     @property
     def lacks(self) -> bool:
         """Whether the room lacks something: it leaves more of the images than k may be, in 19 rooms of 20."""
-        return self.left_ratio > float(np.exp(norm.ppf(1.0 - _FALSE_ALARMS)))
+        return self.left_ratio > float(np.exp(ndtri(1.0 - _FALSE_ALARMS)))
 
     def deviation(
         self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]
