@@ -9,12 +9,20 @@ import pytest
 from core.checkpoint import ForeignCheckpointError
 from core.problem import Problem
 from core.result import Solution
-from core.solve.room import solve_room
+from core.solve.room import RoomSettings, solve_room
 from core.watch import StoppedError, Watch
-from tests.core.solve.test_room import SHORT, SUPPLY, measured, scene
+from tests.core.solve.test_room import SUPPLY, measured, scene
 
-# The cells of the other tests of this solver, so that what they compile is read and not compiled again.
-SETTINGS = SHORT
+SETTINGS = RoomSettings(
+    cells=8,
+    coarse_cells=6,
+    vertices=9,
+    settle_s=60.0,
+    restart_s=30.0,
+    restart_walls_s=30.0,
+    refine_s=30.0,
+    rounds=2,
+)
 
 
 class Asked:
@@ -177,6 +185,6 @@ def test_whoever_watches_sees_the_air_grow(problem: Problem):
     stopped_at = Watch(look, lambda: len(grown) == 2)
     with pytest.raises(StoppedError):
         solve_room(problem, SETTINGS, stopped_at)
-    assert grown[1].temperature_k.shape == (SETTINGS.vertices,) * 3
+    assert grown[1].temperature_k.shape == (9, 9, 9)
     assert not np.array_equal(grown[0].temperature_k, grown[1].temperature_k)
     assert 290.0 < grown[1].temperature_k.mean() < 306.0
