@@ -17,7 +17,7 @@ from core.scene import PointSensors, Wall
 
 # A camera of fewer pixels, or a mean of fewer frames, sees less than a usual one.
 _PIXELS, _FRAMES = 2000, 100
-# What every sentence says that bids distrust of a whole result; what explains most comes first.
+# Words of every sentence that bids distrust of a whole result. Swapped pictures explain the rest, so they come first.
 _DOUBTS = ("may be swapped", "distrust")
 
 
