@@ -1,8 +1,8 @@
 """What was compiled once is kept in the user's cache folder: a second solve of the same kind starts at once.
 
 A grid level takes five to twenty seconds to compile and a second to run. Programs hold machine code, so
-each kind of processor has its own folder: a home folder may be shared by unlike machines. Compiled code is
-never kept by half: an entry that was cut off fails its checksum and is compiled again.
+each kind of processor has its own folder: a home folder may be shared by unlike machines. An entry that another
+process is still writing, or that was cut off, fails its checksum and the program is compiled again.
 """
 
 import contextlib
@@ -10,6 +10,7 @@ import hashlib
 import os
 import platform
 import sys
+import warnings
 from pathlib import Path
 
 from app.files.user_folders import cache_folder
@@ -19,6 +20,8 @@ LARGEST_BYTES = 1_000_000_000
 
 def use_compilation_cache() -> Path | None:
     """Turn the cache on, unless JAX_COMPILATION_CACHE_DIR says where; None where no folder can be made."""
+    # JAX then compiles anew: nothing that the operator has to know.
+    warnings.filterwarnings("ignore", "Error reading persistent compilation cache entry")
     if os.environ.get("JAX_COMPILATION_CACHE_DIR"):
         return None
     folder = _own_folder()
