@@ -17,6 +17,7 @@ import tifffile
 
 from app.errors import BadInputError
 from app.files.image_folder import SUFFIXES, find_images
+from app.files.npz import read_npy
 from app.files.provenance import sha256
 from app.files.reading import reading
 from drivers.errors import DeviceNotFoundError, DeviceSettingError
@@ -161,7 +162,7 @@ def _read(file: Path, said: str) -> Iterator[Pixels]:
         if file.suffix.lower() in RAW_SUFFIXES:
             yield _read_raw(file)
         elif file.suffix == ".npy":
-            yield _counts(said, np.load(file, allow_pickle=False))
+            yield _counts(said, read_npy(file))
         elif file.suffix.lower() in (".tif", ".tiff"):
             yield from _read_tiff(file, said)
         else:

@@ -1,5 +1,11 @@
-"""NPZ files that somebody gives: bounded before anything is unpacked, without objects."""
+"""NumPy's files that somebody gives: bounded before anything is unpacked, without objects.
 
+NumPy reads the header of an array by Python's `ast`, and all threads share one count of its depth (CPython issue
+106905): of two that read at once one may be told "AST constructor recursion depth mismatch" of a good file. So
+threads read one at a time.
+"""
+
+import threading
 import zipfile
 from pathlib import Path
 
@@ -9,6 +15,13 @@ from app.errors import BadInputError
 from app.files.reading import reading
 
 LARGEST_BYTES = 2 << 30
+ONE_AT_A_TIME = threading.Lock()
+
+
+def read_npy(path: Path) -> np.ndarray:
+    """The array. Raises ValueError for what is none."""
+    with ONE_AT_A_TIME:
+        return np.load(path, allow_pickle=False)
 
 
 def read_npz(path: Path, what_to_do: str, names: tuple[str, ...] | None = None) -> dict[str, np.ndarray]:
@@ -21,5 +34,5 @@ def read_npz(path: Path, what_to_do: str, names: tuple[str, ...] | None = None) 
                 f"{path} unpacks to {unpacked / 1e9:.1f} GB; expected at most {LARGEST_BYTES / 1e9:.1f} GB. "
                 "Resample it on a coarser grid."
             )
-        with np.load(path, allow_pickle=False) as file:
+        with ONE_AT_A_TIME, np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in names or file.files}

@@ -1,25 +1,34 @@
 """The shift estimator beside scikit-image's on the same pairs: bias, scatter over the stated deviation, time.
 
     python -m tests.benchmarks.shift [--seeds 3] [--size 512]
+    python -m tests.benchmarks.shift --photographed FOLDER
 
 A band-limited texture (`period_px` to 40 px) is shifted exactly in the Fourier domain; the camera has a full
 well of 10,000 electrons, 20 of read noise and 12 bits; windows of 32 px. One JSON line a pair and estimator. `bias`
 is the mean shift found over the true one, less 1; `rms_z` the error over the stated standard deviation; `outliers`
 the share of windows that are wrong by more than half a pixel. scikit-image states no deviation.
+
+FOLDER has a photographed pair, `reference.tif` and `flow.tif`, and what PIVlab made of it, `u_piv.mat` and
+`v_piv.mat` (windows of 16 px, 8 px apart). `rms_px` is then the difference from that, across and down, and `slope`
+how much further the windows moved than PIVlab says, by how far they moved.
 """
 
 import argparse
 import json
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
+import tifffile
+from scipy import io, ndimage
+from scipy.interpolate import RegularGridInterpolator
 from skimage.registration import optical_flow_ilk, phase_cross_correlation
 
 from core.displacement import measure_shift, standard_deviation_px
 
 WINDOW_PX, EDGE_PX = 32, 48
+_PIV_PX = 16
 _FULL_WELL_E, _READ_E, _STEPS = 1e4, 20.0, 4095
 Found = tuple[np.ndarray, np.ndarray | None]
 
@@ -121,13 +130,50 @@ def measured(size: int, seeds: int) -> Iterator[dict[str, object]]:
             yield {key: round(value, 5) if isinstance(value, float) else value for key, value in line.items()}
 
 
+def photographed(folder: Path) -> Iterator[dict[str, object]]:
+    """A photographed pair by this project and by scikit-image's dense flow, beside PIVlab's."""
+    reference, flow = (
+        tifffile.imread(folder / f"{name}.tif") / np.float32(255) for name in ("reference", "flow")
+    )
+    known = measure_shift(reference, flow, 2 / 12 / 255**2, _PIV_PX)
+    at = known.centres_px[:, ::-1]
+    piv = np.stack([_piv(folder / f"{way}_piv.mat", at) for way in "uv"], axis=1)
+    rows, columns = optical_flow_ilk(reference, flow, radius=_PIV_PX // 2, num_warp=10)
+    row, column = at.astype(int).T
+    dense = np.stack([columns[row, column], rows[row, column]], axis=1)
+    kept = np.isfinite(piv).all(axis=1) & (
+        np.ones(len(at), bool) if known.refused is None else ~known.refused
+    )
+    length_px = np.linalg.norm(piv, axis=1)
+    for name, found in (("airlens", known.displacement_px), ("ilk", dense)):
+        for low_px, high_px in ((0.0, 0.3), (0.3, 1.0), (1.0, 8.0), (0.0, 8.0)):
+            chosen = kept & (length_px >= low_px) & (length_px < high_px)
+            pair_px, piv_px = found[chosen], piv[chosen]
+            rms_px = np.sqrt(((pair_px - piv_px) ** 2).mean(axis=0))
+            yield {
+                "pair": folder.name, "moved_px": [low_px, high_px], "windows": int(chosen.sum()), "estimator": name,
+                "rms_px": [round(float(px), 4) for px in rms_px],
+                "slope": round(float((pair_px * piv_px).sum() / (piv_px**2).sum()), 3),
+            }  # fmt: skip
+
+
+def _piv(path: Path, at_px: np.ndarray) -> np.ndarray:
+    """What PIVlab found at places (row, column); NaN beyond its grid, which begins a window from the edge."""
+    (cell,) = (value for name, value in io.loadmat(path).items() if not name.startswith("__"))
+    found = np.asarray(cell.ravel()[0], float)
+    axes = [_PIV_PX + 0.5 + _PIV_PX / 2 * np.arange(n) for n in found.shape]
+    return RegularGridInterpolator(axes, found, bounds_error=False, fill_value=np.nan)(at_px)
+
+
 def main() -> None:
     """Print the lines."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--size", type=int, default=512)
+    parser.add_argument("--photographed", type=Path)
     options = parser.parse_args()
-    for line in measured(options.size, options.seeds):
+    chosen = options.photographed
+    for line in photographed(chosen) if chosen else measured(options.size, options.seeds):
         print(json.dumps(line), flush=True)
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Annotated, Literal
 
-import numpy as np
 from fastapi import APIRouter, Query, Response
 
 from app.api.models.jobs import Curves, JobChange, JobResource, NewJob, State
@@ -13,6 +12,7 @@ from app.api.wire.identifier import Identifier
 from app.api.wire.problems import ApiError
 from app.api.wire.volumes import pack
 from app.experiment.plan import PlacesLine
+from app.files.npz import read_npy
 from app.jobs import Job, JobSpec, JobState, explained, kinds
 from app.jobs.attempt import PLANE_FILE
 from app.jobs.folder import JobFolder
@@ -92,7 +92,7 @@ def read_field(given: Given, job: Identifier) -> Response:
     found = given.ledger.get(job)
     path = JobFolder(given.ledger.folder / found.id).attempt(found.attempt) / PLANE_FILE
     try:
-        plane = np.load(path, allow_pickle=False)
+        plane = read_npy(path)
     except (FileNotFoundError, ValueError):
         return Response(status_code=204)
     packed = pack(plane, "f32")

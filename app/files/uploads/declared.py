@@ -16,6 +16,7 @@ from typing import BinaryIO, Literal
 import numpy as np
 
 from app.errors import BadInputError
+from app.files.npz import ONE_AT_A_TIME
 from app.files.reading import reading
 from app.files.uploads.tiff import tiff_pages
 
@@ -130,7 +131,8 @@ def _npy(file: BinaryIO, name: str, size_bytes: int) -> Declared:
             (1, 0): np.lib.format.read_array_header_1_0,
             (2, 0): np.lib.format.read_array_header_2_0,
         }
-        shape, _, dtype = readers[version](file, max_header_size=HEADER_BYTES)
+        with ONE_AT_A_TIME:
+            shape, _, dtype = readers[version](file, max_header_size=HEADER_BYTES)
         if any(n < 0 for n in shape):
             raise ValueError(f"its shape is {shape}")
     if dtype.kind not in "biuf" or dtype.itemsize > 8 or len(shape) > 4:

@@ -18,6 +18,7 @@ import numpy as np
 
 from app.errors import BadInputError
 from app.files.durable import write_durably, write_json
+from app.files.npz import read_npy
 from app.files.reading import read_json
 from app.files.uploads.declared import HEAD_BYTES, HEADER_BYTES, Kind, check_head, declared_arrays
 
@@ -96,7 +97,7 @@ class UploadStore:
             return None
         packed = folder / "room.npz"
         if not packed.is_file():
-            arrays = {path.stem: np.load(path, allow_pickle=False) for path in folder.glob("*.npy")}
+            arrays = {path.stem: read_npy(path) for path in folder.glob("*.npy")}
             write_durably(packed, lambda temporary: _save(temporary, arrays))
         return packed
 
