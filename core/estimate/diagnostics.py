@@ -31,17 +31,17 @@ def contradictions(
     problem: Problem,
     prior: Prior,
     posterior: Posterior,
-    by_closure: Float[np.ndarray, " active"],
+    by_model: Float[np.ndarray, " active"],
     doubt_of_velocity: float = 0.0,
 ) -> list[str]:
     """One sentence for each entered value that the measurements contradict.
 
-    `by_closure` is how far another closure would move each parameter, in prior deviations. Where entries are as
-    right as stated and the closure is as wrong as that, one room in twenty has such a sentence. Where the velocity is
+    `by_model` is how far what the model has wrong moves each parameter, one standard deviation, in prior deviations.
+    Where entries are as right as stated and the model as wrong as that, one room in twenty has such a sentence. Where the velocity is
     doubtful (`doubtful`) none has: what is wrong with the model moves entries as well.
     """
     fitted = prior.parameters(posterior.vector)
-    doubt = np.sqrt(1.0 + by_closure**2)
+    doubt = np.sqrt(1.0 + by_model**2)
     limit = float(ndtri(1.0 - _FALSE_ALARMS / (2.0 * max(len(doubt), 1))))
     times = dict(zip(prior.names(), np.abs(posterior.vector) / doubt, strict=True))
     believed = {name: n for name, n in times.items() if n > limit and doubt_of_velocity <= _DOUBTFUL}

@@ -13,7 +13,10 @@ Where the images do not tell two models apart it stays 1. A room that leaves far
 images than models differ in lacks something, such as a heater that nobody stated.
 
 d at a point is one draw of three components. An error whose variance is known from three squares has Student's t
-distribution with nu = 3 (Gosset, Biometrika 6 (1908)), whose standard deviation is sqrt(3) times as large.
+distribution with nu = 3 (Gosset, Biometrika 6 (1908)), whose standard deviation is sqrt(3) times as large. That is
+for a point's interval. A mean over the room has many draws: the mean of <d^2> / 2 is that of the error's square, with
+no such factor (`mean_square`). Likewise k m / sqrt(2) is how far what the model has wrong moves the parameters
+(`moves`).
 """
 
 import equinox as eqx
@@ -59,10 +62,24 @@ class ModelError(eqx.Module):
         """Whether the room lacks something: it leaves more of the images than k may be, in 19 rooms of 20."""
         return self.left_ratio > float(np.exp(ndtri(1.0 - _FALSE_ALARMS)))
 
+    @property
+    def moves(self) -> Float[np.ndarray, " active"]:
+        """How far what the model has wrong moves each parameter, one standard deviation, in prior deviations."""
+        return self.size * np.sqrt(_EACH * np.sum(self.moved**2, axis=0))
+
     def deviation(
         self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]
     ) -> Float[np.ndarray, "vx vy vz ..."]:
         """One standard deviation of the field of this name; `derivatives` are its own, per prior deviation."""
+        return np.sqrt(_STUDENT / (_STUDENT - 2.0) * self._variance(name, derivatives))
+
+    def mean_square(self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]) -> float:
+        """The expected square of the field's error, mean over the room."""
+        return float(np.mean(self._variance(name, derivatives)))
+
+    def _variance(
+        self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]
+    ) -> Float[np.ndarray, "vx vy vz ..."]:
         variance = np.zeros(getattr(self.pairs[0][0], name).shape)
         for (one, other), moved in zip(self.pairs, self.moved, strict=True):
             apart = getattr(other, name) - getattr(one, name) - np.tensordot(moved, derivatives, axes=1)
@@ -72,7 +89,7 @@ class ModelError(eqx.Module):
             # A mean over one correlation length: one standard deviation to each side.
             width = [0.5 * LENGTH_SHARE * n for n in apart.shape[:3]] + [0.0] * (apart.ndim - 3)
             variance += _EACH * ndimage.gaussian_filter(apart**2, width)
-        return self.size * np.sqrt(_STUDENT / (_STUDENT - 2.0) * variance)
+        return self.size**2 * variance
 
 
 def model_error(

@@ -80,7 +80,9 @@ def solution(
     temperature = _deviation(analysis, "excess_k", None, (before + of_points, after + of_points))
     pressure = _deviation(analysis, "pressure_m2_s2", error, bent)
     velocity = _deviation(analysis, "velocity_m_s", error)
-    doubt = rms(velocity.std) / max(rms(fields.velocity_m_s), float(np.finfo(np.float32).tiny))
+    doubt = expected_velocity_error_m_s(analysis, error) / max(
+        rms(fields.velocity_m_s), float(np.finfo(np.float32).tiny)
+    )
     return Solution(
         x,
         y,
@@ -110,7 +112,7 @@ def sentences(analysis: Analysis, error: ModelError, doubt: float, moved_k: floa
         *analysis.layout.notes,
         *undetermined(analysis.problem),
         *left_out(analysis.data.moved),
-        *contradictions(analysis.problem, analysis.prior, analysis.posterior, np.abs(error.moved[0]), doubt),
+        *contradictions(analysis.problem, analysis.prior, analysis.posterior, error.moves, doubt),
         *misfit(analysis.data, explained(analysis.data, analysis.best.fields), error),
         *doubtful(doubt),
         *other_way(likeness(analysis.data, analysis.stated_room)),
@@ -122,6 +124,13 @@ def model_error_of(analysis: Analysis) -> ModelError:
     """What the model of the air has wrong: first as two closures differ, then as two grids do."""
     pairs = (analysis.coarse, analysis.other), (analysis.coarse, analysis.first)
     return model_error(analysis.data, analysis.posterior, analysis.derivatives, pairs, analysis.best.fields)
+
+
+def expected_velocity_error_m_s(analysis: Analysis, error: ModelError) -> float:
+    """How wrong the velocity is expected to be, rms over the room [m/s]."""
+    slopes = analysis.derivatives.per_deviation(lambda run: run.velocity_m_s)
+    by_parameters = deviation(slopes, analysis.posterior.covariance, 0.0).std
+    return float(np.sqrt(rms(by_parameters) ** 2 + error.mean_square("velocity_m_s", slopes)))
 
 
 def outflow_excess_k(analysis: Analysis) -> float:

@@ -1,5 +1,8 @@
 """What a second and a third view add: one room, seen at y_max alone, with x_max too, with the ceiling too.
 
+With `--side x_min` the second camera looks at x_min, where the rooms' supplies are, and stands opposite to them.
+`--views 2` takes two views alone.
+
 Each is an experiment of its own, simulated, reconstructed and scored by the product's functions. One JSON line a set
 of views: the errors of T and u, how many points the 95 % intervals hold, and the seconds. `T_air_rms_K` leaves out
 the vertices on the walls: those on a wall of unknown temperature that a camera looks through have the wall's own.
@@ -7,6 +10,7 @@ the vertices on the walls: those on a wall of unknown temperature that a camera 
 parallel lines, without noise, leave to whoever knows nothing else.
 
     python -m tests.benchmarks.views TRUTH.npz ... [--camera-px 1024] [--frames 60] [--preset draft] [--world lab]
+        [--side x_min] [--views 2]
         [--seed 0] [--seeds 20]    # as many, from that one on; each seed with all rooms before the next one
 """
 
@@ -27,11 +31,10 @@ from app.volume.score import in_air, score_experiment, values_at
 from core.geometry import WallName
 from core.metrics import rms
 
-SETS: tuple[tuple[WallName, ...], ...] = (
-    ("y_max",),
-    ("y_max", "x_max"),
-    ("y_max", "x_max", "z_max"),
-)
+
+def sets_of(side: WallName) -> tuple[tuple[WallName, ...], ...]:
+    """The walls looked at: one, two and three of them."""
+    return ("y_max",), ("y_max", side), ("y_max", side, "z_max")
 
 
 _AXES = {"x": 0, "y": 1, "z": 2}
@@ -57,12 +60,16 @@ def main() -> None:
     parser.add_argument("--information", default="operator")
     parser.add_argument("--rig", default="lab", choices=RIG_PLACES)
     parser.add_argument("--world", default="ideal", choices=tuple(WORLDS))
+    parser.add_argument("--side", default="x_max", choices=("x_min", "x_max"))
+    parser.add_argument("--views", type=int, choices=(1, 2, 3), help="this many alone; else each number")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seeds", type=int, default=1)
     asked = parser.parse_args()
     for seed in range(asked.seed, asked.seed + asked.seeds):
         for truth in asked.truth:
-            for walls in SETS:
+            for walls in sets_of(asked.side):
+                if asked.views not in (None, len(walls)):
+                    continue
                 print(json.dumps(row(asked, truth, seed, walls)), flush=True)
 
 

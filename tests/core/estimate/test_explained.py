@@ -95,11 +95,9 @@ def test_noise_takes_nothing_from_how_alike_pictures_and_room_are_but_makes_it_u
     assert alarms <= 1
 
 
-@pytest.mark.parametrize(
-    ("closure", "doubt", "told"), [(0.0, 0.2, True), (2.0, 0.2, False), (0.0, 0.6, False)]
-)
+@pytest.mark.parametrize(("model", "doubt", "told"), [(0.0, 0.2, True), (2.0, 0.2, False), (0.0, 0.6, False)])
 def test_an_entry_is_called_wrong_only_beyond_what_entry_and_model_allow(
-    closure: float, doubt: float, told: bool
+    model: float, doubt: float, told: bool
 ):
     given = problem(stated=True)
     prior = prior_of(given)
@@ -108,7 +106,7 @@ def test_an_entry_is_called_wrong_only_beyond_what_entry_and_model_allow(
     vector[own] = 4.0
     found = Posterior(vector, 0.01 * np.eye(len(vector)), np.zeros(0))
 
-    said = contradictions(given, prior, found, np.full(len(vector), closure), doubt)
+    said = contradictions(given, prior, found, np.full(len(vector), model), doubt)
 
     assert len(said) == told
     assert all("4.0 times what the entry and the model may be wrong by" in text for text in said)
@@ -121,10 +119,10 @@ def test_of_rooms_with_right_entries_one_in_twenty_has_such_a_sentence():
     active = len(prior.names())
     alarms = 0
     for _ in range(400):
-        by_closure = rng.uniform(0.0, 2.0, active)
-        vector = np.sqrt(1.0 + by_closure**2) * rng.normal(size=active)
+        by_model = rng.uniform(0.0, 2.0, active)
+        vector = np.sqrt(1.0 + by_model**2) * rng.normal(size=active)
         found = Posterior(vector, 0.01 * np.eye(active), np.zeros(0))
-        alarms += bool(contradictions(given, prior, found, by_closure))
+        alarms += bool(contradictions(given, prior, found, by_model))
     assert 0.01 < alarms / 400 < 0.08
 
 

@@ -109,6 +109,23 @@ def test_intervals_hold_errors_of_the_kind_that_they_are_made_from():
     np.testing.assert_allclose(double.deviation("velocity_m_s", np.zeros((0, *SHAPE, 3))), 2 * std, rtol=1e-6)
 
 
+def test_over_a_room_the_error_is_expected_to_be_as_large_as_it_is():
+    draw = np.random.default_rng(5)
+    # Two models that are wrong each by itself, more in one half of the room than in the other.
+    wrong = np.where(np.arange(SHAPE[0]) < 3, 0.2, 0.05)[:, None, None, None]
+    one, other = (wrong * draw.normal(size=(*SHAPE, 3)) for _ in range(2))
+    apart = ModelError(((still(one), still(other)),), np.zeros((1, 0)), 1.0, 1.0)
+
+    expected = apart.mean_square("velocity_m_s", np.zeros((0, *SHAPE, 3)))
+
+    assert expected == pytest.approx(np.mean(one**2), rel=0.15)
+
+
+def test_parameters_move_as_far_as_either_model_is_wrong_by_its_size():
+    moved = np.array([[3.0, 0.0], [0.0, 1.0]])
+    np.testing.assert_allclose(ModelError((), moved, 0.5, 0.5).moves, [0.5 * 3 / 2**0.5, 0.5 / 2**0.5])
+
+
 def test_a_velocity_of_which_half_may_be_wrong_is_not_to_be_believed():
     assert doubtful(0.24) == ["The velocity is expected to be wrong by 24 % of its size (rms)."]
     assert "distrust the velocity" in " ".join(doubtful(0.51))
