@@ -37,8 +37,8 @@ def contradictions(
     """One sentence for each entered value that the measurements contradict.
 
     `by_model` is how far what the model has wrong moves each parameter, one standard deviation, in prior deviations.
-    Where entries are as right as stated and the model as wrong as that, one room in twenty has such a sentence. Where the velocity is
-    doubtful (`doubtful`) none has: what is wrong with the model moves entries as well.
+    Where entries are as right as stated and the model as wrong as that, one room in twenty has such a sentence. Where
+    the velocity is doubtful (`doubtful`) none has: what is wrong with the model moves entries as well.
     """
     fitted = prior.parameters(posterior.vector)
     doubt = np.sqrt(1.0 + by_model**2)
