@@ -80,9 +80,7 @@ def solution(
     temperature = _deviation(analysis, "excess_k", None, (before + of_points, after + of_points))
     pressure = _deviation(analysis, "pressure_m2_s2", error, bent)
     velocity = _deviation(analysis, "velocity_m_s", error)
-    doubt = expected_velocity_error_m_s(analysis, error) / max(
-        rms(fields.velocity_m_s), float(np.finfo(np.float32).tiny)
-    )
+    doubt = doubt_of_velocity(analysis, error)
     return Solution(
         x,
         y,
@@ -126,11 +124,13 @@ def model_error_of(analysis: Analysis) -> ModelError:
     return model_error(analysis.data, analysis.posterior, analysis.derivatives, pairs, analysis.best.fields)
 
 
-def expected_velocity_error_m_s(analysis: Analysis, error: ModelError) -> float:
-    """How wrong the velocity is expected to be, rms over the room [m/s]."""
+def doubt_of_velocity(analysis: Analysis, error: ModelError) -> float:
+    """How wrong the velocity is expected to be over the room, over its size, both rms."""
     slopes = analysis.derivatives.per_deviation(lambda run: run.velocity_m_s)
-    by_parameters = deviation(slopes, analysis.posterior.covariance, 0.0).std
-    return float(np.sqrt(rms(by_parameters) ** 2 + error.mean_square("velocity_m_s", slopes)))
+    by_parameters = rms(deviation(slopes, analysis.posterior.covariance, 0.0).std)
+    by_model = error.mean_square("velocity_m_s", slopes) ** 0.5
+    size = max(rms(analysis.best.fields.velocity_m_s), float(np.finfo(np.float32).tiny))
+    return float(np.hypot(by_parameters, by_model)) / size
 
 
 def outflow_excess_k(analysis: Analysis) -> float:

@@ -1,13 +1,13 @@
 """What a second and a third view add: one room, seen at y_max alone, with x_max too, with the ceiling too.
 
-With `--side x_min` the second camera looks at x_min, where the rooms' supplies are, and stands opposite to them.
-`--views 2` takes two views alone.
-
 Each is an experiment of its own, simulated, reconstructed and scored by the product's functions. One JSON line a set
 of views: the errors of T and u, how many points the 95 % intervals hold, and the seconds. `T_air_rms_K` leaves out
 the vertices on the walls: those on a wall of unknown temperature that a camera looks through have the wall's own.
 `line_means_K` is the error of the best sum of fields that each do not vary along one of the views: what means along
 parallel lines, without noise, leave to whoever knows nothing else.
+
+With `--side x_min` the second camera looks at x_min, where the rooms' supplies are, and stands opposite to them.
+`--views 2` takes the sets of two views alone.
 
     python -m tests.benchmarks.views TRUTH.npz ... [--camera-px 1024] [--frames 60] [--preset draft] [--world lab]
         [--side x_min] [--views 2]
@@ -32,12 +32,13 @@ from core.geometry import WallName
 from core.metrics import rms
 
 
-def sets_of(side: WallName) -> tuple[tuple[WallName, ...], ...]:
-    """The walls looked at: one, two and three of them."""
-    return ("y_max",), ("y_max", side), ("y_max", side, "z_max")
-
-
 _AXES = {"x": 0, "y": 1, "z": 2}
+
+
+def sets_of(side: WallName, views: int | None) -> list[tuple[WallName, ...]]:
+    """The walls that are looked at: one, two and three of them, or so many as `views`."""
+    walls: tuple[WallName, ...] = ("y_max", side, "z_max")
+    return [walls[:n] for n in (1, 2, 3) if views in (None, n)]
 
 
 def line_means_k(truth: RoomVolume, walls: tuple[WallName, ...]) -> float:
@@ -67,9 +68,7 @@ def main() -> None:
     asked = parser.parse_args()
     for seed in range(asked.seed, asked.seed + asked.seeds):
         for truth in asked.truth:
-            for walls in sets_of(asked.side):
-                if asked.views not in (None, len(walls)):
-                    continue
+            for walls in sets_of(asked.side, asked.views):
                 print(json.dumps(row(asked, truth, seed, walls)), flush=True)
 
 

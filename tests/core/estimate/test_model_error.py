@@ -111,7 +111,7 @@ def test_intervals_hold_errors_of_the_kind_that_they_are_made_from():
 
 def test_over_a_room_the_error_is_expected_to_be_as_large_as_it_is():
     draw = np.random.default_rng(5)
-    # Two models that are wrong each by itself, more in one half of the room than in the other.
+    # Two models that are wrong each by itself, more at one end of the room than elsewhere.
     wrong = np.where(np.arange(SHAPE[0]) < 3, 0.2, 0.05)[:, None, None, None]
     one, other = (wrong * draw.normal(size=(*SHAPE, 3)) for _ in range(2))
     apart = ModelError(((still(one), still(other)),), np.zeros((1, 0)), 1.0, 1.0)
