@@ -31,7 +31,6 @@ from app.volume.score import in_air, score_experiment, values_at
 from core.geometry import WallName
 from core.metrics import rms
 
-
 _AXES = {"x": 0, "y": 1, "z": 2}
 
 
