@@ -304,29 +304,27 @@ def _outlet(volume: RoomVolume) -> list[Outlet]:
     if not volume.case.get("outlet"):
         return []
     patch = _patch(volume.case["outlet"])
-    return [Outlet(patch=patch, mean_temperature_k=_mean_on_plane(volume, patch))]
+    return [Outlet(patch=patch, mean_temperature_k=_leaving_k(volume, patch))]
 
 
-def _mean_on_plane(volume: RoomVolume, patch: Patch) -> float:
-    """Mean temperature over a patch of the plane x_min, away from its rim: there a vertex is half wall."""
-    (low_y, low_z), (high_y, high_z) = patch.lower_m, patch.upper_m
-    inside = _inside(volume.y_m, low_y, high_y), _inside(volume.z_m, low_z, high_z)
-    values = volume.temperature_k[0][np.ix_(*inside)]
-    if values.size == 0:
+def _leaving_k(volume: RoomVolume, patch: Patch) -> float:
+    """Temperature of what leaves by a patch of x_min: the mean of the air one vertex before it, by outflow.
+
+    Not on the patch itself: on its rim a vertex is half wall, and shows a part of the wall's temperature.
+    """
+    lower, upper = patch.lower_m, patch.upper_m
+    inside = np.ix_(*(
+        (axis_m >= low_m - 1e-6) & (axis_m <= high_m + 1e-6)
+        for axis_m, low_m, high_m in zip((volume.y_m, volume.z_m), lower, upper, strict=True)
+    ))  # fmt: skip
+    air_k = volume.temperature_k[1][inside].astype(np.float64)
+    if air_k.size == 0:
         raise BadInputError(
-            f"The outlet {patch.lower_m} to {patch.upper_m} m lies between the volume's vertices; "
+            f"The outlet {lower} to {upper} m lies between the volume's vertices; "
             "resample the volume on a finer grid."
         )
-    return float(values.mean(dtype=np.float64))
-
-
-def _inside(axis_m: np.ndarray, lower_m: float, upper_m: float) -> np.ndarray:
-    """Which vertices lie within, more than half a spacing from the ends if any do."""
-    rim_m = 0.5 * float(np.diff(axis_m).max())
-    away, all_of_it = (
-        (axis_m >= lower_m + margin_m) & (axis_m <= upper_m - margin_m) for margin_m in (rim_m, -1e-6)
-    )
-    return away if away.any() else all_of_it
+    leaving = np.maximum(-volume.velocity_m_s[0, ..., 0][inside].astype(np.float64), 0.0)
+    return float(np.average(air_k, weights=leaving if leaving.any() else None))
 
 
 def _wall(name: str, wall: WallName, volume: RoomVolume, information: Information) -> Wall:

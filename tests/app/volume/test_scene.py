@@ -1,44 +1,68 @@
 import numpy as np
 import pytest
 
+from app.errors import BadInputError
 from app.volume.file import RoomVolume
 from app.volume.scene import known_boundary
 from core.scene import Outlet
 
 VERTICES = (5, 21, 21)
+CELL_M = 0.12
 
 
-def read_k(outlet: dict[str, list[float]]) -> float:
-    """What the outlet's thermometer reads where air of 300 K leaves through a wall of 290 K.
+def volume_of(outlet: dict[str, list[float]]) -> RoomVolume:
+    """Air of 300 K before a wall of 290 K that has an outlet.
 
-    As programs for flow write it: a vertex on the outlet's rim has the mean of air and wall.
+    As programs for flow write it: a vertex within a cell of the outlet's rim has a part of the wall's temperature.
     """
-    x, y, z = (np.linspace(0.0, 2.0, n) for n in VERTICES)
+    x, y, z = axes = [np.linspace(0.0, 2.0, n) for n in VERTICES]
     temperature = np.full(VERTICES, 300.0, np.float32)
     inside, reached = (
-        np.ix_(within(y, outlet["y"], margin_m), within(z, outlet["z"], margin_m))
-        for margin_m in (-1e-6, 1e-6)
+        np.ix_(*(within(axis, span, margin_m) for axis, span in zip(axes[1:], outlet.values(), strict=True)))
+        for margin_m in (-CELL_M, 1e-6)
     )
     temperature[0] = 290.0
     temperature[0][reached] = 295.0
     temperature[0][inside] = 300.0
-    volume = RoomVolume(
-        x, y, z, temperature, np.zeros(VERTICES, np.float32), np.zeros((*VERTICES, 3), np.float32), 293.15,
-        case={"outlet": outlet},
-    )  # fmt: skip
-    (found,) = (part for part in known_boundary(volume, "operator") if isinstance(part, Outlet))
-    assert found.mean_temperature_k is not None
-    return found.mean_temperature_k
+    velocity = np.zeros((*VERTICES, 3), np.float32)
+    velocity[0, ..., 0][reached] = -0.1
+    velocity[0, ..., 0][inside] = -0.2
+    return RoomVolume(
+        x, y, z, temperature, np.zeros(VERTICES, np.float32), velocity, 293.15, case={"outlet": outlet}
+    )
 
 
 def within(axis: np.ndarray, span: list[float], margin_m: float) -> np.ndarray:
     return (axis > span[0] - margin_m) & (axis < span[1] + margin_m)
 
 
-def test_a_thermometer_in_an_outlet_reads_the_air_and_not_the_rim():
-    assert read_k({"y": [0.5, 1.5], "z": [0.2, 0.6]}) == pytest.approx(300.0)
+def read_k(volume: RoomVolume) -> float:
+    """What the outlet's thermometer reads."""
+    (found,) = (part for part in known_boundary(volume, "operator") if isinstance(part, Outlet))
+    assert found.mean_temperature_k is not None
+    return found.mean_temperature_k
+
+
+@pytest.mark.parametrize("z", [[0.2, 0.6], [0.2, 0.63], [0.17, 0.69]])
+def test_a_thermometer_in_an_outlet_reads_the_air_and_not_the_rim(z):
+    assert read_k(volume_of({"y": [0.5, 1.5], "z": z})) == pytest.approx(300.0)
 
 
 def test_a_slot_narrower_than_the_vertices_reads_what_is_there():
     # One row of vertices, on neither rim.
-    assert read_k({"y": [0.5, 1.5], "z": [0.28, 0.32]}) == pytest.approx(300.0)
+    assert read_k(volume_of({"y": [0.5, 1.5], "z": [0.28, 0.32]})) == pytest.approx(300.0)
+
+
+def test_what_leaves_counts_by_how_fast_it_leaves():
+    volume = volume_of({"y": [0.45, 1.55], "z": [0.25, 0.85]})
+    upper = volume.z_m > 0.55
+    volume.temperature_k[1][:, upper] = 296.0
+    volume.velocity_m_s[0][:, upper] *= 3.0
+    assert read_k(volume) == pytest.approx((1 * 300.0 + 3 * 296.0) / 4)
+    volume.velocity_m_s[:] = 0.0
+    assert read_k(volume) == pytest.approx(298.0)
+
+
+def test_an_outlet_between_the_vertices_is_refused():
+    with pytest.raises(BadInputError, match="finer grid"):
+        read_k(volume_of({"y": [0.5, 1.5], "z": [0.22, 0.28]}))
