@@ -24,6 +24,7 @@ from jaxtyping import Float
 from scipy.linalg import block_diag
 from scipy.optimize import minimize
 
+from core.data_error import LENGTH_SHARE, alike_share
 from core.estimate.least_squares import spread
 from core.estimate.observation import IMAGES, OUTLETS, PLANES, SENSORS, Observations, ShiftBlocks
 from core.geometry import face_of
@@ -34,13 +35,10 @@ from core.room.vertices import linear_matrix
 _CORRELATED = 4.0
 # Basis functions along x and z.
 _LATTICE = (9, 11)
-# Correlation length of K and of other errors of the model, as a share of the room.
-LENGTH_SHARE = 0.2
 # Of K's variance: errors of the profile over height, and local errors.
 _PROFILE_PART, _LOCAL_PART = 0.7, 0.3
-# An error of T is taken to be as short along y as along x and z. Its mean along y keeps this share of its variance:
-# the mean of exp(-|a - b| / l) over a and b from 0 to 1, with l the correlation length.
-_SEEN_SHARE = 2 * LENGTH_SHARE - 2 * LENGTH_SHARE**2 * (1 - np.exp(-1 / LENGTH_SHARE))
+# An error of T is taken to be as short along y as along x and z: of its variance the mean along y keeps this share.
+_SEEN_SHARE = alike_share(1)
 # Standard deviation of the layer of a plane on a wall of unknown temperature, as a share of the rms departure of T
 # from its mean at each height.
 _LAYER_SHARE = 1.0

@@ -1,9 +1,9 @@
 """One Gauss-Newton step on a room's uncertain parameters, with a Jacobian from a coarser room.
 
-    minimise  |d - f(q)|^2 / (s^2 + r^2) / c  +  sum log(1 + q^2 / nu) (nu + 1),  nu = 3
+    minimise  |d - f(q)|^2 / (s^2 + c r^2)  +  sum log(1 + q^2 / nu) (nu + 1),  nu = 3
 
-q are the parameters in units of their prior deviations. s is each datum's noise; r is the representation
-error, estimated for each kind of data; c is the number of neighbouring data whose errors are correlated.
+q are the parameters in units of their prior deviations. s is each datum's own noise; r is the representation
+error, estimated for each kind of data, which c data have alike (`Observations.alike`).
 The prior is Student's t, so that the data can overrule an entry that is wrong by many deviations. The closure's
 viscosity, which nobody enters, has a Gaussian prior: with a Student's t it would move in place of a wrong supply.
 """
@@ -12,8 +12,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from core.data_error import CORRELATED_DATA
-from core.estimate.observation import IMAGES, PLANES
+from core.estimate.observation import IMAGES
 
 _STUDENT_NU = 3.0
 LONGEST_STEP = 3.0
@@ -79,13 +78,14 @@ def damped(
 
 def weighted_variance(
     variance: Float[np.ndarray, " data"],
+    alike: Float[np.ndarray, " data"],
     group: Int[np.ndarray, " data"],
     residual: Float[np.ndarray, " data"],
     grid_difference: Float[np.ndarray, " data"],
     *,
     far: bool = False,
 ) -> Float[np.ndarray, " data"]:
-    """Noise plus representation error of each datum, times the number of correlated neighbours.
+    """Noise of each datum, and its representation error times how many data have it `alike`.
 
     The representation error of a kind of data is the difference of two grids, or the misfit if that is smaller.
     With `far` the images' whole misfit counts as representation error: far from the truth their derivatives are
@@ -97,7 +97,7 @@ def weighted_variance(
         error = spread(residual[own])
         if g != IMAGES or not far:
             error = min(error, spread(grid_difference[own]))
-        total[own] = (variance[own] + error**2) * (CORRELATED_DATA if g in (IMAGES, PLANES) else 1.0)
+        total[own] = variance[own] + alike[own] * error**2
     return total
 
 

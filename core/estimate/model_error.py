@@ -26,8 +26,7 @@ from scipy import ndimage
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtri
 
-from core.data_error import CORRELATED_DATA
-from core.estimate.discrepancy import LENGTH_SHARE
+from core.data_error import LENGTH_SHARE
 from core.estimate.forward_runs import Derivatives
 from core.estimate.image_noise import images, unshared
 from core.estimate.least_squares import Posterior
@@ -117,7 +116,8 @@ def model_error(
     shown = data.values()[2] == IMAGES
     apart = np.stack([unshared(data, of[shown]) for of in apart])
     left, noise = seen.left_px, seen.variance_px2
-    return ModelError(pairs, moved, size_of(left, noise, apart), _left_ratio(left, noise, apart))
+    size = size_of(left, noise, apart, data.alike()[shown])
+    return ModelError(pairs, moved, size, _left_ratio(left, noise, apart))
 
 
 def _left_ratio(
@@ -135,11 +135,12 @@ def size_of(
     left: Float[np.ndarray, " data"],
     noise: Float[np.ndarray, " data"],
     apart: Float[np.ndarray, "pairs data"],
+    alike: Float[np.ndarray, " data"],
 ) -> float:
     """The likeliest k, from what a room leaves of the images and their noise's variance; 1 without images."""
     if not len(left):
         return 1.0
-    independent = len(left) / CORRELATED_DATA
+    independent = float(np.sum(1.0 / alike))
     power, noise_power, unit = np.mean(left**2), np.mean(noise), _unit_power(apart)
 
     def unlikely(log_size: float) -> float:

@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float, Int
 from scipy.interpolate import RegularGridInterpolator
 
 from core.continuity import moved_as_air
-from core.data_error import PLANE_NOISE_K, WALL_MARGIN
+from core.data_error import PLANE_NOISE_K, WALL_MARGIN, alike_share
 from core.estimate.plane_openings import still_vertices
 from core.geometry import Box, face_of
 from core.known import measured_outlets
@@ -154,6 +154,17 @@ class Observations(eqx.Module):
         )
         group = np.concatenate([np.full(np.size(v), g) for v, _, g in parts] or [np.zeros(0)]).astype(int)
         return values, variance, group
+
+    def alike(self) -> Float[np.ndarray, " data"]:
+        """How many data share what the model has wrong in each, itself included, in the order of `values`.
+
+        The share of a picture's or a plane's data that a correlation length makes alike; 1 for thermometers.
+        """
+        share = alike_share(2)
+        counts = [len(blocks.displacement_px) for blocks, _ in self.views() for _ in range(2)]
+        counts += self.plane_blocks()
+        alike = np.concatenate([np.zeros(0), *(np.full(n, max(share * n, 1.0)) for n in counts)])
+        return np.concatenate([alike, np.ones(len(self.values()[0]) - len(alike))])
 
     def predicted(self, room: RoomFields) -> Float[np.ndarray, " data"]:
         """What measurements would show of this room, in the order of `values`."""

@@ -50,7 +50,7 @@ def variance_of(
     """`weighted_variance` of the data, by what neither the camera nor another shared error explains."""
     _, noise, group = data.values()
     residual, grid_difference = (data.unshared(of, noise) for of in (residual, grid_difference))
-    return weighted_variance(noise, group, residual, grid_difference, far=far)
+    return weighted_variance(noise, data.alike(), group, residual, grid_difference, far=far)
 
 
 def misfit_ratio(

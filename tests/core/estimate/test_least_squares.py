@@ -62,12 +62,21 @@ def test_far_from_the_truth_a_thermometer_holds_against_images_that_the_room_doe
     # One parameter; ten shifts ask for 3, a thermometer for -2, and two grids agree to a tenth.
     group = np.array([0] * 10 + [4])
     residual = np.where(group == 0, 3.0, -2.0)
-    noise, grids = np.full(11, 1e-4), np.full(11, 0.1)
+    noise, grids, alike = np.full(11, 1e-4), np.full(11, 0.1), np.where(group == 0, 12.0, 1.0)
 
     def step(*, far: bool) -> float:
-        variance = weighted_variance(noise, group, residual, grids, far=far)
+        variance = weighted_variance(noise, alike, group, residual, grids, far=far)
         found = gauss_newton(np.zeros(1), residual, variance, np.ones((11, 1)), np.array([True]))
         return float(found.vector[0])
 
     assert step(far=False) > -1.0
     assert step(far=True) == pytest.approx(-2.0, abs=0.1)
+
+
+def test_noise_is_each_datums_own_and_what_a_model_has_wrong_is_shared():
+    group, alike = np.zeros(1000, int), np.full(1000, 40.0)
+    residual = np.full(1000, 0.3)
+
+    variance = weighted_variance(np.full(1000, 0.01), alike, group, residual, np.full(1000, 1.0))
+
+    np.testing.assert_allclose(variance, 0.01 + 40.0 * 0.09, rtol=1e-6)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from core.data_error import CORRELATED_DATA
 from core.estimate.diagnostics import doubtful
 from core.estimate.forward_runs import Derivatives
 from core.estimate.least_squares import Posterior
@@ -28,7 +27,7 @@ def test_the_size_is_that_of_what_is_left_beyond_the_noise(true_size: float):
     # Two pairs: half of both is what the model has wrong.
     left = true_size * draw.normal(size=40_000) + 0.05 * draw.normal(size=40_000)
 
-    assert size_of(left, noise, apart) == pytest.approx(true_size, rel=0.02)
+    assert size_of(left, noise, apart, np.full(40_000, 12.0)) == pytest.approx(true_size, rel=0.02)
 
 
 def test_of_rooms_that_lack_nothing_one_in_twenty_is_said_to_lack_something():
@@ -40,11 +39,13 @@ def test_of_rooms_that_lack_nothing_one_in_twenty_is_said_to_lack_something():
 
 def test_without_a_word_of_the_images_the_size_is_one():
     draw = np.random.default_rng(4)
-    noise = draw.normal(size=int(CORRELATED_DATA) * 200)
+    noise, alike = draw.normal(size=2400), np.full(2400, 12.0)
 
-    assert size_of(np.zeros(0), np.zeros(0), np.zeros((1, 0))) == 1.0
+    assert size_of(np.zeros(0), np.zeros(0), np.zeros((1, 0)), np.zeros(0)) == 1.0
     # Two models that the images do not tell apart.
-    assert size_of(noise, np.ones(len(noise)), np.full((1, len(noise)), 1e-6)) == pytest.approx(1.0, abs=0.01)
+    assert size_of(noise, np.ones(len(noise)), np.full((1, len(noise)), 1e-6), alike) == pytest.approx(
+        1.0, abs=0.01
+    )
 
 
 def test_a_model_that_explains_the_images_is_believed_more_than_one_that_does_not():
