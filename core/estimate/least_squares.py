@@ -87,17 +87,17 @@ def weighted_variance(
 ) -> Float[np.ndarray, " data"]:
     """Noise of each datum, and its representation error times how many data have it `alike`.
 
-    The representation error of a kind of data is the difference of two grids, or the misfit if that is smaller.
-    With `far` the images' whole misfit counts as representation error: far from the truth their derivatives are
-    no better than that, and a stated supply or a thermometer must not yield to them.
+    The representation error of a kind of data is the difference of two grids, or what the misfit has beyond the noise
+    if that is smaller. With `far` the latter counts for images in any case: far from the truth their derivatives are no
+    better than that, and a stated supply or a thermometer must not yield to them.
     """
     total = np.zeros_like(variance)
     for g in np.unique(group):
         own = group == g
-        error = spread(residual[own])
+        wrong = max(spread(residual[own]) ** 2 - float(variance[own].mean()), 0.0)
         if g != IMAGES or not far:
-            error = min(error, spread(grid_difference[own]))
-        total[own] = variance[own] + alike[own] * error**2
+            wrong = min(wrong, spread(grid_difference[own]) ** 2)
+        total[own] = variance[own] + alike[own] * wrong
     return total
 
 

@@ -79,4 +79,4 @@ def test_noise_is_each_datums_own_and_what_a_model_has_wrong_is_shared():
 
     variance = weighted_variance(np.full(1000, 0.01), alike, group, residual, np.full(1000, 1.0))
 
-    np.testing.assert_allclose(variance, 0.01 + 40.0 * 0.09, rtol=1e-6)
+    np.testing.assert_allclose(variance, 0.01 + 40.0 * (0.3**2 - 0.01), rtol=1e-6)
