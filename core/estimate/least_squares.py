@@ -88,8 +88,8 @@ def weighted_variance(
     """Noise of each datum, and its representation error times how many data have it `alike`.
 
     The representation error of a kind of data is the difference of two grids, or what the misfit has beyond the noise
-    if that is smaller. With `far` the latter counts for images in any case: far from the truth their derivatives are no
-    better than that, and a stated supply or a thermometer must not yield to them.
+    if that is smaller. With `far` the latter counts for images in any case: far from the truth their derivatives
+    are no better than that, and a stated supply or a thermometer must not yield to them.
     """
     total = np.zeros_like(variance)
     for g in np.unique(group):
