@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.data_error import LENGTH_SHARE, alike_share
 from core.estimate.observation import observations
 from core.estimate.prior import room_prior
 from core.geometry import Box, looking_along_y
 from core.known import leaving_excess_k
-from core.problem import Problem
+from core.problem import Problem, ShiftMeasurement
 from core.room.forward import room, room_fields
 from core.room.vertices import RoomFields
 from core.scene import FixedTexture, FlowModel, Inlet, Outlet, Patch, Scene, View
@@ -77,3 +78,19 @@ def test_two_outlets_on_the_same_cells_share_what_leaves_there():
 )
 def test_what_leaves_is_the_mean_of_the_thermometers_weighted_as_the_flow_divides(outlets, leaving_k):
     assert leaving_excess_k(problem(*outlets)) == pytest.approx(leaving_k)
+
+
+def test_as_many_of_a_pictures_data_share_the_models_error_as_a_correlation_length_makes_alike():
+    places = np.linspace(0, 1, 2001)
+    apart = np.abs(places[:, None] - places[None, :])
+    assert alike_share(1) == pytest.approx(np.exp(-apart / LENGTH_SHARE).mean(), rel=1e-3)
+
+    given = problem(LOW, HIGH)
+    centres_px = np.stack(np.meshgrid(np.arange(2.0, 64, 4), np.arange(2.0, 64, 4)), -1).reshape(-1, 2)
+    shifts = ShiftMeasurement(centres_px, 0 * centres_px, np.tile(np.eye(2), (len(centres_px), 1, 1)), 4)
+    data = observations(replace(given, shifts=(shifts,)), VERTICES)
+
+    blocks = len(data.shifts[0].displacement_px)
+    assert blocks > 50
+    # Both components of each block, and then two thermometers that stand alone.
+    assert data.alike() == pytest.approx([alike_share(2) * blocks] * (2 * blocks) + [1.0, 1.0])
