@@ -308,9 +308,9 @@ def _outlet(volume: RoomVolume) -> list[Outlet]:
 
 
 def _leaving_k(volume: RoomVolume, patch: Patch) -> float:
-    """Temperature of what leaves by a patch of x_min: the mean of the air one vertex before it, by outflow.
+    """Temperature of what leaves by a patch of x_min: the mean of the air one vertex before it, weighted by outflow.
 
-    Not on the patch itself: on its rim a vertex is half wall, and shows a part of the wall's temperature.
+    Not on the patch itself: near its rim a vertex shows a part of the wall's temperature.
     """
     lower, upper = patch.lower_m, patch.upper_m
     inside = np.ix_(*(

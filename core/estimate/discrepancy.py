@@ -37,7 +37,7 @@ _CORRELATED = 4.0
 _LATTICE = (9, 11)
 # Of K's variance: errors of the profile over height, and local errors.
 _PROFILE_PART, _LOCAL_PART = 0.7, 0.3
-# An error of T is taken to be as short along y as along x and z: of its variance the mean along y keeps this share.
+# An error of T is correlated along y as along x and z: of its variance the mean along y keeps this share.
 _SEEN_SHARE = alike_share(1)
 # Standard deviation of the layer of a plane on a wall of unknown temperature, as a share of the rms departure of T
 # from its mean at each height.

@@ -3,7 +3,7 @@
     minimise  |d - f(q)|^2 / (s^2 + c r^2)  +  sum log(1 + q^2 / nu) (nu + 1),  nu = 3
 
 q are the parameters in units of their prior deviations. s is each datum's own noise; r is the representation
-error, estimated for each kind of data, which c data have alike (`Observations.alike`).
+error, estimated for each kind of data; c is how many data share it (`Observations.alike`).
 The prior is Student's t, so that the data can overrule an entry that is wrong by many deviations. The closure's
 viscosity, which nobody enters, has a Gaussian prior: with a Student's t it would move in place of a wrong supply.
 """
@@ -85,7 +85,7 @@ def weighted_variance(
     *,
     far: bool = False,
 ) -> Float[np.ndarray, " data"]:
-    """Noise of each datum, and its representation error times how many data have it `alike`.
+    """Noise of each datum, and its representation error times how many data share it (`alike`).
 
     The representation error of a kind of data is the difference of two grids, or what the misfit has beyond the noise
     if that is smaller. With `far` the latter counts for images in any case: far from the truth their derivatives

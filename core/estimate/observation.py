@@ -156,9 +156,10 @@ class Observations(eqx.Module):
         return values, variance, group
 
     def alike(self) -> Float[np.ndarray, " data"]:
-        """How many data share what the model has wrong in each, itself included, in the order of `values`.
+        """How many data count as one, because they share the model's error, in the order of `values`.
 
-        The share of a picture's or a plane's data that a correlation length makes alike; 1 for thermometers.
+        In a picture, for each component of the shift, and in a plane a fixed share of the data (`alike_share`); 1 for
+        thermometers.
         """
         share = alike_share(2)
         counts = [len(blocks.displacement_px) for blocks, _ in self.views() for _ in range(2)]
