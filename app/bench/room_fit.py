@@ -19,7 +19,7 @@ from app.volume.measurement import synthetic_problem
 from app.volume.scene import RIG_PLACES, Information, RigName, RigOptions
 from app.volume.score import coverage, score_solution
 from core.motion import MOTIONS, CameraMotion
-from core.problem import Problem
+from core.problem import Problem, ShiftMeasurement
 from core.scene import FlowModel, Inlet, Scene
 from core.solve.room import RoomSettings, solve_room
 
@@ -49,6 +49,9 @@ def register(bench: typer.Typer) -> None:
                 help="Nothing is still, and the camera moved by so much (in its quarter-size pixels)."
             ),
         ] = 0.0,
+        views: Annotated[
+            str, typer.Option(help="The walls that are looked at, with commas between.")
+        ] = "y_max",
         images: Annotated[bool, typer.Option(help="Whether the images correct anything.")] = True,
         cells: Annotated[int, typer.Option(help="Cells of the fine room.")] = 48,
         seeds: Annotated[int, typer.Option(help="Noise seeds 0 to this one, exclusive.")] = 1,
@@ -58,7 +61,7 @@ def register(bench: typer.Typer) -> None:
         settings = RoomSettings(cells=cells, use_images=images, wall_heat=wall_heat)
         for path in truth:
             for seed in range(seeds):
-                problem, volume = problem_of(path, information, light, rig, seed, drift_px)
+                problem, volume = problem_of(path, information, light, rig, seed, drift_px, views)
                 problem = entered(problem, wrong, closure)
                 row = {
                     "truth": path.stem,
@@ -68,6 +71,7 @@ def register(bench: typer.Typer) -> None:
                     "seed": seed,
                 }
                 row |= {
+                    "views": views,
                     "drift_px": drift_px,
                     "wrong": wrong,
                     "wall_heat": wall_heat,
@@ -85,24 +89,33 @@ def problem_of(
     rig: RigName,
     seed: int,
     drift_px: float = 0.0,
+    views: str = "y_max",
 ) -> tuple[Problem, RoomVolume]:
     """The problem that the default rig's noise makes of a volume; with `drift_px` the camera moved as well."""
     volume = read_volume(path)
     stand_off_m, baseline_m = RIG_PLACES[rig]
     options = RigOptions(
-        camera_px=_CAMERA_PX, frames=_FRAMES, light=light, stand_off_m=stand_off_m, baseline_m=baseline_m
+        camera_px=_CAMERA_PX,
+        frames=_FRAMES,
+        light=light,
+        stand_off_m=stand_off_m,
+        baseline_m=baseline_m,
+        walls=tuple(views.split(",")),  # type: ignore[arg-type]
     )
     problem = synthetic_problem(volume, options, information, window_px=_WINDOW_PX, seed=seed)
     return moved(problem, drift_px, seed) if drift_px else problem, volume
 
 
 def moved(problem: Problem, drift_px: float, seed: int) -> Problem:
-    """The problem after the camera moved, in each of its six ways, by a draw; known is its deviation alone."""
-    (shift,) = problem.shifts
-    motion = CameraMotion(problem.scene.views[0].camera, drift_px * np.eye(MOTIONS))
-    step_px = motion.at(shift.centres_px) @ np.random.default_rng([seed, 77]).standard_normal(MOTIONS)
-    shift = replace(shift, displacement_px=shift.displacement_px + step_px, motion=motion)
-    return replace(problem, shifts=(shift,))
+    """The problem after each camera moved, in each of its six ways, by a draw; known is its deviation alone."""
+
+    def after(view: int, shift: ShiftMeasurement) -> ShiftMeasurement:
+        motion = CameraMotion(problem.scene.views[view].camera, drift_px * np.eye(MOTIONS))
+        draw = np.random.default_rng([seed, 77, view] if view else [seed, 77]).standard_normal(MOTIONS)
+        step_px = motion.at(shift.centres_px) @ draw
+        return replace(shift, displacement_px=shift.displacement_px + step_px, motion=motion)
+
+    return replace(problem, shifts=tuple(after(n, shift) for n, shift in enumerate(problem.shifts)))
 
 
 def entered(problem: Problem, wrong: float, closure: str) -> Problem:

@@ -19,13 +19,14 @@ from scipy import ndimage
 from app.reconstruct.problem import Known, problem_of
 from app.volume.file import RoomVolume
 from app.volume.scene import Information, RigOptions, room_scene
-from core.fields import GridField
+from core.fields import AbstractField, GridField
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays import NonlinearTracer
 from core.rays.visibility import sees_wall
 from core.render import PixelGeometry, pixel_geometry, render_reference
 from core.render.shift import wall_offset_m
 from core.scene import PlaneField, Scene
+from core.view_frame import facing, field_facing, turn_of
 from core.window_fit import derivative_filter
 
 TRACED_STEPS = 160
@@ -36,9 +37,16 @@ _FINER = 2
 def synthetic_problem(
     volume: RoomVolume, options: RigOptions, information: Information, *, window_px: int, seed: int
 ) -> Problem:
-    """What this rig measures of this room, and what an operator with this information knows."""
+    """What each view of this rig measures of this room, and what an operator with this information knows."""
     scene = room_scene(volume, options, information)
-    return problem_of(known_of_volume(volume, scene), (_measure(volume, scene, window_px, seed),))
+    field = fine_field(volume, scene)
+    shifts = tuple(
+        _measure(
+            *facing(scene, n), field_facing(field, turn_of(scene, n)), window_px, [seed, n] if n else seed
+        )
+        for n in range(len(scene.views))
+    )
+    return problem_of(known_of_volume(volume, scene), shifts)
 
 
 def known_of_volume(volume: RoomVolume, scene: Scene) -> Known:
@@ -79,21 +87,24 @@ def tracer_of(scene: Scene) -> NonlinearTracer:
     return NonlinearTracer(TRACED_STEPS, scene.air.ambient_refractivity)
 
 
-def _measure(volume: RoomVolume, scene: Scene, window_px: int, seed: int) -> ShiftMeasurement:
-    centres = _centres(scene, window_px)
-    exact_px = _traced(scene, fine_field(volume, scene), centres, window_px)
-    information = _information(scene, window_px)
+def _measure(
+    scene: Scene, view: int, field: AbstractField, window_px: int, seed: int | list[int]
+) -> ShiftMeasurement:
+    """What a view measures; scene and field are in the view's own frame."""
+    centres = _centres(scene, view, window_px)
+    exact_px = _traced(scene, view, field, centres, window_px)
+    information = _information(scene, view, window_px)
     noise = np.random.default_rng(seed).standard_normal(exact_px.shape)
     # information = L Lᵀ, so L⁻ᵀ times white noise has its inverse as covariance.
     root = np.linalg.cholesky(information)
     drawn = np.linalg.solve(root.transpose(0, 2, 1), noise[..., None])[..., 0]
     # As in a measurement: windows that do not see the patterned wall whole say nothing.
-    seen = sees_wall(scene, 0, centres, margin_px=float(window_px))
+    seen = sees_wall(scene, view, centres, margin_px=float(window_px))
     return ShiftMeasurement(centres[seen], (exact_px + drawn)[seen], information[seen], window_px)
 
 
-def _centres(scene: Scene, window_px: int) -> Float[np.ndarray, "windows 2"]:
-    camera = scene.views[0].camera
+def _centres(scene: Scene, view: int, window_px: int) -> Float[np.ndarray, "windows 2"]:
+    camera = scene.views[view].camera
     columns, rows = (
         (np.arange(n // window_px) + 0.5) * window_px - 0.5 for n in (camera.width_px, camera.height_px)
     )
@@ -102,7 +113,7 @@ def _centres(scene: Scene, window_px: int) -> Float[np.ndarray, "windows 2"]:
 
 
 def _traced(
-    scene: Scene, field: GridField, centres: Float[np.ndarray, "windows 2"], window_px: int
+    scene: Scene, view: int, field: AbstractField, centres: Float[np.ndarray, "windows 2"], window_px: int
 ) -> Float[np.ndarray, "windows 2"]:
     """Mean displacement [px] of a window's rays: minus the wall offset, seen by the camera."""
     steps = (np.arange(_RAYS_A_WINDOW) - (_RAYS_A_WINDOW - 1) / 2) * window_px / _RAYS_A_WINDOW
@@ -110,13 +121,13 @@ def _traced(
     total = np.zeros_like(centres)
     for down in steps:
         for right in steps:
-            geometry = pixel_geometry(scene, 0, centres + np.array([right, down]))
+            geometry = pixel_geometry(scene, view, centres + np.array([right, down]))
             total += np.asarray(_seen_px(geometry, field, tracer), np.float64)
     return total / _RAYS_A_WINDOW**2
 
 
 @eqx.filter_jit
-def _seen_px(geometry: PixelGeometry, field: GridField, tracer: NonlinearTracer):
+def _seen_px(geometry: PixelGeometry, field: AbstractField, tracer: NonlinearTracer):
     offset_m = wall_offset_m(geometry, field, tracer)
     pattern_px = jnp.einsum("rij,rj->ri", geometry.pattern_from_wall, offset_m)
     inverse = jax.vmap(jnp.linalg.inv)(_safe(geometry.pattern_from_pixel))
@@ -129,16 +140,15 @@ def _safe(matrix):
     return jnp.where(dark[:, None, None], jnp.eye(2, dtype=matrix.dtype)[None], matrix)
 
 
-def _information(scene: Scene, window_px: int) -> Float[np.ndarray, "windows 2 2"]:
+def _information(scene: Scene, view: int, window_px: int) -> Float[np.ndarray, "windows 2 2"]:
     """Sums of the reference's gradients over the variance of a difference of two mean images."""
     # What is known at the boundary does not change the picture.
-    reference = _reference(replace(scene, boundary=()))
-    view = scene.views[0]
+    reference = _reference(replace(scene, boundary=()), view)
+    noise, frames = scene.views[view].noise, scene.views[view].frames
     taps = derivative_filter()
     slopes = [ndimage.correlate1d(reference, taps, axis=axis, mode="nearest") for axis in (1, 0)]
-    noise = view.noise
     variance_e = noise.full_well_e * reference + noise.read_noise_e**2
-    variance = 2 * variance_e / noise.full_well_e**2 / view.frames
+    variance = 2 * variance_e / noise.full_well_e**2 / frames
     rows, cols = (n // window_px for n in reference.shape)
 
     def summed(values: np.ndarray) -> np.ndarray:
@@ -152,5 +162,5 @@ def _information(scene: Scene, window_px: int) -> Float[np.ndarray, "windows 2 2
 
 
 @lru_cache(maxsize=2)
-def _reference(scene: Scene) -> np.ndarray:
-    return np.clip(render_reference(scene), 1e-3, None)
+def _reference(scene: Scene, view: int) -> np.ndarray:
+    return np.clip(render_reference(scene, view), 1e-3, None)
