@@ -8,6 +8,7 @@ misread as far as their deviations say. Rooms of even number are for choosing an
 number for figures; from 1000 on they are for nobody to look at.
 
     python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32] [--by openfoam]
+        [--views y_max,x_max]
     python -m tests.benchmarks.random_rooms FOLDER --summary
     python -m tests.benchmarks.random_rooms FOLDER --stated  # everything is known, nothing is fitted
 
@@ -116,10 +117,10 @@ def made(folder: Path, number: int, by: str) -> Path:
     return path
 
 
-def row_of(folder: Path, number: int, cells: int, by: str) -> dict[str, Any]:
+def row_of(folder: Path, number: int, cells: int, by: str, views: str) -> dict[str, Any]:
     """Make the room if it is not there, fit it, and say how far off the result is and what it says of itself."""
     path, what = made(folder, number, by), drawn(number)
-    problem, volume = problem_of(path, "operator", "texture", "paper", number)
+    problem, volume = problem_of(path, "operator", "texture", "paper", number, views=views)
     stated = what.heater is not None and number % 4 >= 2
     problem = _entered(problem, number, heater_of(read_volume(path)) if stated else None)
     fit = fit_row(problem, volume, RoomSettings(cells=cells))
@@ -127,6 +128,7 @@ def row_of(folder: Path, number: int, cells: int, by: str) -> dict[str, Any]:
     carried_k = inner(volume.temperature_k[:1] - volume.temperature_k)
     return {
         "room": number,
+        "views": views,
         "closure": json.loads(path.with_suffix(".json").read_text())["closure"],
         "supplies": len(what.inlets),
         "heater": None if what.heater is None else ("stated" if stated else "not stated"),
@@ -205,6 +207,7 @@ def main() -> None:
     parser.add_argument("--rooms", type=int, default=12, help="every second one from --first")
     parser.add_argument("--cells", type=int, default=32)
     parser.add_argument("--by", choices=("airlens", "openfoam"), default="airlens")
+    parser.add_argument("--views", default="y_max", help="the walls that are looked at, with commas between")
     parser.add_argument("--stated", action="store_true", help="everything stated, nothing fitted")
     parser.add_argument("--summary", action="store_true")
     options = parser.parse_args()
@@ -217,7 +220,8 @@ def main() -> None:
     for number in range(options.first, options.first + 2 * options.rooms, 2):
         if any(row["room"] == number for row in done):
             continue
-        row = (stated_row if options.stated else row_of)(options.folder, number, options.cells, options.by)
+        how = options.folder, number, options.cells, options.by
+        row = stated_row(*how) if options.stated else row_of(*how, options.views)
         with rows.open("a") as file:
             file.write(json.dumps(row) + "\n")
         print(json.dumps(row), flush=True)
