@@ -26,10 +26,6 @@ from core.setting import check_range, setting
 # of them; the limit stops a march whose air is far faster than what was stated.
 _STEPS = 0.6
 
-# A march goes on while the mean velocity of a window differs by more than this share from the window before; for so
-# many times as long at most.
-_RESTLESS, _LONGER = 0.05, 3.0
-
 # A jet in the reference room responds to a change of its supply within this time.
 _RESPONSE_S = 60.0
 
@@ -144,26 +140,21 @@ def march_under(
     marches: Marches,
     *,
     doing: str | None = None,
-    as_long_as: March | None = None,
 ) -> ForwardRun:
     """March `flow` under these parameters; `seconds` are those of the reference room.
 
-    It takes longer while the air is restless, or `as_long_as` another march of these seconds has taken. What it is
-    for, `doing`, is told with every window; without it nothing is.
+    What the march is for, `doing`, is told with every window; without it nothing is.
     """
     model = where.model(parameters)
     flow = eqx.tree_at(lambda f: f.velocity, flow, set_normal(flow.velocity, model.boundary))
     turnover_ratio = where.turnover_ratio
-    longest_s = seconds * turnover_ratio
     timing = MarchSettings(
-        longest_s=longest_s,
-        more_s=as_long_as.model_s - longest_s if as_long_as else (_LONGER - 1.0) * longest_s,
-        restless=0.0 if as_long_as else _RESTLESS,
+        longest_s=seconds * turnover_ratio,
         least_s=min(seconds, _RESPONSE_S) * turnover_ratio,
         window_s=min(15.0, seconds) * turnover_ratio,
-        settle_s=0.15 * longest_s,
+        settle_s=0.15 * seconds * turnover_ratio,
         level_ahead_s=20.0 * turnover_ratio,
-        most_steps=round(_STEPS * float(np.prod(where.grid.cells)) ** (1 / 3) * seconds * _LONGER),
+        most_steps=round(_STEPS * float(np.prod(where.grid.cells)) ** (1 / 3) * seconds),
     )
     counted = work(where.grid, seconds)
 
@@ -204,18 +195,17 @@ def perturbed(
     the derivatives and the run that none was moved in, where the next restarts begin.
     """
     flow, seconds = base.flow.last, settings.restarts_s(prior)
-    unmoved = march_under(where, prior.parameters(vector), flow, seconds, vertices, marches)
 
-    def one(step: Float[np.ndarray, " active"]) -> RoomFields:
-        moved, as_long_as = prior.parameters(vector + step), unmoved.flow
-        return march_under(where, moved, flow, seconds, vertices, marches, as_long_as=as_long_as).fields
+    def one(step: Float[np.ndarray, " active"]) -> ForwardRun:
+        return march_under(where, prior.parameters(vector + step), flow, seconds, vertices, marches)
 
-    others: list[RoomFields] = []
+    found: list[ForwardRun] = []
     with ThreadPoolExecutor(settings.threads) as pool:
-        for fields in pool.map(one, np.diag(spread)):
-            others.append(fields)
+        for run in pool.map(one, [np.zeros(len(spread)), *np.diag(spread)]):
+            found.append(run)
             doing = "move one parameter after the other"
-            marches.record({"doing": doing, "moved": float(len(others)), "of": float(len(spread))})
+            marches.record({"doing": doing, "moved": len(found) - 1.0, "of": float(len(spread))})
+    unmoved, others = found[0], [run.fields for run in found[1:]]
     return Derivatives(unmoved.fields, others, np.diag(spread)), unmoved
 
 

@@ -1,9 +1,9 @@
 """March a room to its steady state, in windows of model time.
 
 The march ends when the mean velocity of a window differs from that of the window before by less than `tolerance`
-(relative rms), at `longest_s`, or after `most_steps`. A room that is still restless at `longest_s` may march on. The
-result is the mean over the last fifth of the time, since flows on coarse grids may oscillate. If a value becomes
-infinite, the march returns to the last window and halves the Courant number, once.
+(relative rms), at `longest_s`, or after `most_steps`. The result is the mean over the last fifth of the time, since
+flows on coarse grids may oscillate. If a value becomes infinite, the march returns to the last window and halves
+the Courant number, once.
 
 Time is what the room's cells have lived through in the mean: each takes its own steps (`core.room.pace`).
 
@@ -38,10 +38,9 @@ class MarchSettings:
 
     `least_s`: no march is called steady before it; just after a change of the supply windows hardly differ.
     `level_ahead_s`: how far the layers' heat balance is extrapolated after each window (`core.room.level`; 0: not at
-    all), from `settle_s` to two thirds of `longest_s`. `more_s`: how much longer than `longest_s` a march goes on at
-    most, while its windows differ by more than `restless`. No window begins after `most_steps`. A march that ends by
-    its longest time counts as converged if its last windows differ by less than `settled`. One that is not `steady`
-    is true in time: all cells take the same steps, and no wave is damped.
+    all), from `settle_s` to two thirds of `longest_s`. No window begins after `most_steps`. A march that ends by its
+    longest time counts as converged if its last windows differ by less than `settled`. One that is not `steady` is
+    true in time: all cells take the same steps, and no wave is damped.
     """
 
     longest_s: float = 60.0
@@ -49,8 +48,6 @@ class MarchSettings:
     window_s: float = 15.0
     tolerance: float = 0.002
     settled: float = 0.02
-    more_s: float = 0.0
-    restless: float = 0.0
     courant: float = 0.45
     level_ahead_s: float = 20.0
     settle_s: float = 15.0
@@ -113,18 +110,13 @@ def march(
     state = begun or MarchState(flow, courant=settings.courant)
     outcome = None
     while outcome is None:
-        if _is_over(state, settings):
+        if state.model_s >= settings.longest_s - 1e-6 or state.steps >= settings.most_steps:
             outcome = Outcome.converged if state.change < settings.settled else Outcome.step_limit
             break
         state, outcome = _after_window(state, model, settings, check_stop)
         on_window(state)
     mean = _mean(list(state.means)) if state.means else state.flow
     return March(state.flow, mean, outcome, state.model_s, state.steps, state.change)
-
-
-def _is_over(state: MarchState, settings: MarchSettings) -> bool:
-    longer_s = settings.more_s if state.change > settings.restless else 0.0
-    return state.model_s >= settings.longest_s + longer_s - 1e-6 or state.steps >= settings.most_steps
 
 
 def _after_window(

@@ -207,27 +207,3 @@ def test_a_march_that_changes_little_at_its_longest_time_has_converged():
 
     assert ended(2.0) is Outcome.step_limit
     assert ended(20.0) is Outcome.converged
-
-
-@pytest.mark.parametrize(("restless", "lasts_s"), [(0.0, 5.0), (1e9, 3.0)])
-def test_a_march_goes_on_while_the_air_is_restless(restless: float, lasts_s: float):
-    model = flat_room(8, 0.01, (as_it_is, as_it_is), (as_it_is, as_it_is), 1.0)
-    warm = jnp.broadcast_to(jnp.linspace(1.0, 0.0, 8)[:, None, None], model.grid.cells)
-
-    settings = MarchSettings(longest_s=3.0, window_s=1.0, tolerance=0.0, more_s=2.0, restless=restless)
-    end = march(air_at_rest(model, warm, 0.1), model, settings)
-
-    assert end.model_s == pytest.approx(lasts_s)
-
-
-def test_a_restless_march_ends_once_the_air_is_calm():
-    def moving(wall: WallPlane) -> WallPlane:
-        return eqx.tree_at(lambda w: w.tangent_m_s[0], wall, jnp.ones_like(wall.normal_m_s))
-
-    model = flat_room(8, 0.02, (as_it_is, as_it_is), (as_it_is, moving), 0.0)
-    start = air_at_rest(model, jnp.zeros(model.grid.cells), 0.1)
-    settings = MarchSettings(longest_s=2.0, window_s=1.0, tolerance=0.0, more_s=100.0, restless=0.05)
-    end = march(start, model, settings)
-
-    assert 2.0 < end.model_s < 50.0
-    assert end.change <= 0.05
