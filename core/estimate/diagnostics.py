@@ -236,7 +236,10 @@ def undetermined(problem: Problem) -> list[str]:
         through = looked_through(problem.scene)
         alike = ""
         if through and set(through) <= set(unknown):
-            alike = f" ({' and '.join(through)} as one: the camera looks through both)"
+            alike = (
+                f" ({' and '.join(through)} as one: the camera looks through both, and a second one from the side "
+                "would tell them apart)"
+            )
         return [
             f"The heat through {', '.join(unknown)} is not stated; it was fitted to the measurements{alike}. "
             "The velocity depends on it: stating a wall's temperature, or 'adiabatic', helps more than more frames."
