@@ -13,11 +13,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import typer
 
+from app.commands.simulate import parse_walls
 from app.reconstruct.problem import with_scene
 from app.volume.file import RoomVolume, read_volume
 from app.volume.measurement import synthetic_problem
 from app.volume.scene import RIG_PLACES, Information, RigName, RigOptions
 from app.volume.score import coverage, score_solution
+from core.geometry import WallName
 from core.motion import MOTIONS, CameraMotion
 from core.problem import Problem, ShiftMeasurement
 from core.scene import FlowModel, Inlet, Scene
@@ -50,18 +52,19 @@ def register(bench: typer.Typer) -> None:
             ),
         ] = 0.0,
         views: Annotated[
-            str, typer.Option(help="The walls that are looked at, with commas between.")
-        ] = "y_max",
+            str, typer.Option(help="Walls that are looked at, a camera before each: y_max,x_max; y is y_max.")
+        ] = "y",
         images: Annotated[bool, typer.Option(help="Whether the images correct anything.")] = True,
         cells: Annotated[int, typer.Option(help="Cells of the fine room.")] = 48,
         seeds: Annotated[int, typer.Option(help="Noise seeds 0 to this one, exclusive.")] = 1,
         as_json: Annotated[bool, typer.Option("--json")] = False,
     ) -> None:
         """Errors of T, u and p, and the share of points within their 95 % intervals."""
+        walls = parse_walls(views)
         settings = RoomSettings(cells=cells, use_images=images, wall_heat=wall_heat)
         for path in truth:
             for seed in range(seeds):
-                problem, volume = problem_of(path, information, light, rig, seed, drift_px, views)
+                problem, volume = problem_of(path, information, light, rig, seed, drift_px, walls)
                 problem = entered(problem, wrong, closure)
                 row = {
                     "truth": path.stem,
@@ -71,7 +74,7 @@ def register(bench: typer.Typer) -> None:
                     "seed": seed,
                 }
                 row |= {
-                    "views": views,
+                    "views": walls,
                     "drift_px": drift_px,
                     "wrong": wrong,
                     "wall_heat": wall_heat,
@@ -89,7 +92,7 @@ def problem_of(
     rig: RigName,
     seed: int,
     drift_px: float = 0.0,
-    views: str = "y_max",
+    walls: tuple[WallName, ...] = ("y_max",),
 ) -> tuple[Problem, RoomVolume]:
     """The problem that the default rig's noise makes of a volume; with `drift_px` the camera moved as well."""
     volume = read_volume(path)
@@ -100,7 +103,7 @@ def problem_of(
         light=light,
         stand_off_m=stand_off_m,
         baseline_m=baseline_m,
-        walls=tuple(views.split(",")),  # type: ignore[arg-type]
+        walls=walls,
     )
     problem = synthetic_problem(volume, options, information, window_px=_WINDOW_PX, seed=seed)
     return moved(problem, drift_px, seed) if drift_px else problem, volume

@@ -8,7 +8,7 @@ misread as far as their deviations say. Rooms of even number are for choosing an
 number for figures; from 1000 on they are for nobody to look at.
 
     python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32] [--by openfoam]
-        [--views y_max,x_max]
+        [--views y,x]
     python -m tests.benchmarks.random_rooms FOLDER --summary
     python -m tests.benchmarks.random_rooms FOLDER --stated  # everything is known, nothing is fitted
 
@@ -24,11 +24,13 @@ from typing import Any
 import numpy as np
 
 from app.bench.room_fit import fit_row, problem_of
+from app.commands.simulate import parse_walls
 from app.reconstruct.problem import with_scene
 from app.volume.file import read_volume
 from app.volume.misread import misread
 from app.volume.scene import RigOptions, heater_of, room_scene
 from core.estimate.prior import room_prior
+from core.geometry import WallName
 from core.metrics import inner, rms
 from core.problem import Problem
 from core.room.forward import room, room_fields
@@ -117,10 +119,10 @@ def made(folder: Path, number: int, by: str) -> Path:
     return path
 
 
-def row_of(folder: Path, number: int, cells: int, by: str, views: str) -> dict[str, Any]:
+def row_of(folder: Path, number: int, cells: int, by: str, walls: tuple[WallName, ...]) -> dict[str, Any]:
     """Make the room if it is not there, fit it, and say how far off the result is and what it says of itself."""
     path, what = made(folder, number, by), drawn(number)
-    problem, volume = problem_of(path, "operator", "texture", "paper", number, views=views)
+    problem, volume = problem_of(path, "operator", "texture", "paper", number, walls=walls)
     stated = what.heater is not None and number % 4 >= 2
     problem = _entered(problem, number, heater_of(read_volume(path)) if stated else None)
     fit = fit_row(problem, volume, RoomSettings(cells=cells))
@@ -128,7 +130,7 @@ def row_of(folder: Path, number: int, cells: int, by: str, views: str) -> dict[s
     carried_k = inner(volume.temperature_k[:1] - volume.temperature_k)
     return {
         "room": number,
-        "views": views,
+        "views": walls,
         "closure": json.loads(path.with_suffix(".json").read_text())["closure"],
         "supplies": len(what.inlets),
         "heater": None if what.heater is None else ("stated" if stated else "not stated"),
@@ -207,7 +209,7 @@ def main() -> None:
     parser.add_argument("--rooms", type=int, default=12, help="every second one from --first")
     parser.add_argument("--cells", type=int, default=32)
     parser.add_argument("--by", choices=("airlens", "openfoam"), default="airlens")
-    parser.add_argument("--views", default="y_max", help="the walls that are looked at, with commas between")
+    parser.add_argument("--views", default="y", help="the walls that are looked at, such as y,x")
     parser.add_argument("--stated", action="store_true", help="everything stated, nothing fitted")
     parser.add_argument("--summary", action="store_true")
     options = parser.parse_args()
@@ -221,7 +223,7 @@ def main() -> None:
         if any(row["room"] == number for row in done):
             continue
         how = options.folder, number, options.cells, options.by
-        row = stated_row(*how) if options.stated else row_of(*how, options.views)
+        row = stated_row(*how) if options.stated else row_of(*how, parse_walls(options.views))
         with rows.open("a") as file:
             file.write(json.dumps(row) + "\n")
         print(json.dumps(row), flush=True)

@@ -49,10 +49,11 @@ def test_simulated_shifts_are_not_the_inversion_s_own_operator(monkeypatch, view
     assert 1e-3 < difference < 0.2
 
 
-def test_windows_know_their_noise_and_the_seed_draws_it():
-    options = RigOptions(camera_px=(128, 96), frames=4)
+@pytest.mark.parametrize("view", [0, 1])
+def test_windows_know_their_noise_and_the_seed_draws_it(view):
+    options = RigOptions(camera_px=(192, 144), frames=4, walls=("y_max", "x_max"))
     first, again, other = (
-        synthetic_problem.synthetic_problem(VOLUME, options, "paper", window_px=16, seed=seed).shifts[0]
+        synthetic_problem.synthetic_problem(VOLUME, options, "paper", window_px=16, seed=seed).shifts[view]
         for seed in (0, 0, 1)
     )
     np.testing.assert_array_equal(first.displacement_px, again.displacement_px)
