@@ -13,11 +13,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import typer
 
-from app.commands.simulate import parse_walls
 from app.reconstruct.problem import with_scene
 from app.volume.file import RoomVolume, read_volume
 from app.volume.measurement import synthetic_problem
-from app.volume.scene import RIG_PLACES, Information, RigName, RigOptions
+from app.volume.scene import RIG_PLACES, Information, RigName, RigOptions, parse_walls
 from app.volume.score import coverage, score_solution
 from core.geometry import WallName
 from core.motion import MOTIONS, CameraMotion

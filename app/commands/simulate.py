@@ -1,13 +1,13 @@
 """`airlens simulate`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 from rich.progress import Progress
 
 if TYPE_CHECKING:
-    from core.geometry import WallName
+    pass
 
 Size = Annotated[str, typer.Option(help="Camera size, WIDTHxHEIGHT or WIDTH (3:4).")]
 
@@ -99,7 +99,7 @@ def simulate(
     """Make a complete experiment from a room volume: scene, calibration, reference and flow captures."""
     from app.simulate.experiment import simulate as run
     from app.simulate.worlds import WORLDS, changed
-    from app.volume.scene import RIG_PLACES, RigOptions
+    from app.volume.scene import RIG_PLACES, RigOptions, parse_walls
 
     rig_stand_off_m, rig_baseline_m = RIG_PLACES[rig or WORLDS[world].place]
     options = RigOptions(
@@ -149,22 +149,6 @@ def parse_baseline(text: str) -> "tuple[float, float]":
             f"--further-projector is {text!r}; expected metres across and up from the camera, such as -1,-1."
         ) from None
     return across, up
-
-
-def parse_walls(text: str) -> "tuple[WallName, ...]":
-    """'y,x' or 'y_max,x_max' to names of walls. Raises BadInputError."""
-    from app.errors import BadInputError
-    from core.geometry import WALLS
-
-    known: dict[str, WallName] = {"x": "x_max", "y": "y_max", "z": "z_max"}
-    known.update((wall, wall) for wall in WALLS)
-    names = [part.strip() for part in text.split(",")]
-    if not set(names) <= set(known):
-        raise BadInputError(
-            f"The views are {text!r}; expected walls with commas between them, such as y,x or y_max,x_min,z_max: "
-            f"{', '.join(WALLS)}."
-        )
-    return tuple(known[name] for name in names)
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from app.errors import BadInputError
 from app.files.durable import durable_path
 from app.volume.file import RoomVolume
 from core.air import GAS_CONSTANT_DRY_AIR_J_KG_K, Air
-from core.geometry import Box, Optics, Vector2, Vector3, WallName, looking_along_y
+from core.geometry import WALLS, Box, Optics, Vector2, Vector3, WallName, looking_along_y
 from core.objects import RoomObject
 from core.plan.print_choice import suited_print
 from core.scene import (
@@ -96,6 +96,19 @@ class RigOptions:
                 "A further projector lights the wall in turn with a first one, and this wall has a print. Take the "
                 "light 'projector'."
             )
+
+
+def parse_walls(text: str) -> tuple[WallName, ...]:
+    """'y,x' or 'y_max,x_max' to names of walls. Raises BadInputError."""
+    known: dict[str, WallName] = {"x": "x_max", "y": "y_max", "z": "z_max"}
+    known.update((wall, wall) for wall in WALLS)
+    names = [part.strip() for part in text.split(",")]
+    if not set(names) <= set(known):
+        raise BadInputError(
+            f"The views are {text!r}; expected walls with commas between them, such as y,x or y_max,x_min,z_max: "
+            f"{', '.join(WALLS)}."
+        )
+    return tuple(known[name] for name in names)
 
 
 def room_scene(volume: RoomVolume, options: RigOptions, information: Information) -> Scene:

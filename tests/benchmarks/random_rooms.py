@@ -24,11 +24,10 @@ from typing import Any
 import numpy as np
 
 from app.bench.room_fit import fit_row, problem_of
-from app.commands.simulate import parse_walls
 from app.reconstruct.problem import with_scene
 from app.volume.file import read_volume
 from app.volume.misread import misread
-from app.volume.scene import RigOptions, heater_of, room_scene
+from app.volume.scene import RigOptions, heater_of, parse_walls, room_scene
 from core.estimate.prior import room_prior
 from core.geometry import WallName
 from core.metrics import inner, rms
