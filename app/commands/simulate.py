@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 import typer
 from rich.progress import Progress
 
-
 Size = Annotated[str, typer.Option(help="Camera size, WIDTHxHEIGHT or WIDTH (3:4).")]
 
 
