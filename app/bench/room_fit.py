@@ -93,7 +93,7 @@ def problem_of(
     drift_px: float = 0.0,
     walls: tuple[WallName, ...] = ("y_max",),
 ) -> tuple[Problem, RoomVolume]:
-    """The problem that the default rig's noise makes of a volume; with `drift_px` the camera moved as well."""
+    """The problem that the default rig makes of a volume, by views of `walls`; with `drift_px` cameras moved too."""
     volume = read_volume(path)
     stand_off_m, baseline_m = RIG_PLACES[rig]
     options = RigOptions(
@@ -113,7 +113,7 @@ def moved(problem: Problem, drift_px: float, seed: int) -> Problem:
 
     def after(view: int, shift: ShiftMeasurement) -> ShiftMeasurement:
         motion = CameraMotion(problem.scene.views[view].camera, drift_px * np.eye(MOTIONS))
-        draw = np.random.default_rng([seed, 77, view] if view else [seed, 77]).standard_normal(MOTIONS)
+        draw = np.random.default_rng([seed, 77, view]).standard_normal(MOTIONS)
         step_px = motion.at(shift.centres_px) @ draw
         return replace(shift, displacement_px=shift.displacement_px + step_px, motion=motion)
 

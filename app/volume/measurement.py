@@ -41,9 +41,7 @@ def synthetic_problem(
     scene = room_scene(volume, options, information)
     field = fine_field(volume, scene)
     shifts = tuple(
-        _measure(
-            *facing(scene, n), field_facing(field, turn_of(scene, n)), window_px, [seed, n] if n else seed
-        )
+        _measure(*facing(scene, n), field_facing(field, turn_of(scene, n)), window_px, [seed, n])
         for n in range(len(scene.views))
     )
     return problem_of(known_of_volume(volume, scene), shifts)
@@ -88,7 +86,7 @@ def tracer_of(scene: Scene) -> NonlinearTracer:
 
 
 def _measure(
-    scene: Scene, view: int, field: AbstractField, window_px: int, seed: int | list[int]
+    scene: Scene, view: int, field: AbstractField, window_px: int, seed: list[int]
 ) -> ShiftMeasurement:
     """What a view measures; scene and field are in the view's own frame."""
     centres = _centres(scene, view, window_px)

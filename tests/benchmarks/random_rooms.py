@@ -9,10 +9,10 @@ number for figures; from 1000 on they are for nobody to look at.
 
     python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32] [--by openfoam]
         [--views y,x]
-    python -m tests.benchmarks.random_rooms FOLDER --summary
+    python -m tests.benchmarks.random_rooms FOLDER --summary [--views y,x]
     python -m tests.benchmarks.random_rooms FOLDER --stated  # everything is known, nothing is fitted
 
-Volumes and rows stay in FOLDER; a room that has its row is not fitted again.
+Volumes and rows stay in FOLDER; a room that has its row by these views is not fitted again.
 """
 
 import argparse
@@ -214,7 +214,9 @@ def main() -> None:
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     rows = options.folder / ("stated.jsonl" if options.stated else "rows.jsonl")
+    walls = parse_walls(options.views)
     done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
+    done = [row for row in done if tuple(row.get("views", ("y_max",))) == walls]
     if options.summary:
         print(json.dumps(summary([row for row in done if row["room"] % 2])))
         return
@@ -222,7 +224,7 @@ def main() -> None:
         if any(row["room"] == number for row in done):
             continue
         how = options.folder, number, options.cells, options.by
-        row = stated_row(*how) if options.stated else row_of(*how, parse_walls(options.views))
+        row = stated_row(*how) if options.stated else row_of(*how, walls)
         with rows.open("a") as file:
             file.write(json.dumps(row) + "\n")
         print(json.dumps(row), flush=True)
