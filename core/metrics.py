@@ -23,6 +23,11 @@ def inner(volume: np.ndarray) -> np.ndarray:
     return volume[:-1, 1:-1]
 
 
+def off_walls(volume: np.ndarray) -> np.ndarray:
+    """Without the planes of all six walls."""
+    return volume[1:-1, 1:-1, 1:-1]
+
+
 def rms(values: np.ndarray) -> float:
     """Root mean square; of vectors, of their length."""
     squares = np.square(values, dtype=np.float64)
@@ -48,13 +53,21 @@ def ratio(numerator: float, denominator: float) -> float | None:
 
 
 def score_temperature(found_k: Volume, truth_k: Volume, ambient_k: float) -> dict[str, Any]:
-    """rms error in K, relative to the departure from each height's mean, and the trivial answers in K."""
+    """rms error in K, relative to the departure from each height's mean, and the trivial answers in K.
+
+    `air` is the error without the planes of all walls. Vertices on a wall have the temperature of its surface, which
+    may differ from the air's by degrees.
+    """
     truth = inner(truth_k)
     y_mean = np.broadcast_to(mean_of_air(truth, axis=1), truth.shape)
     scale = rms(departure(truth))
     error = rms(inner(found_k) - truth)
     return {
         "rms_K": error,
+        "air": {
+            "rms_K": rms(off_walls(found_k - truth_k)),
+            "inlet_plane": rms(off_walls(truth_k[:1] - truth_k)),
+        },
         "rel_departure": ratio(error, scale),
         "departure_of_departures": ratio(rms(departure(inner(found_k)) - departure(truth)), scale),
         "trivial": {

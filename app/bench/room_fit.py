@@ -145,6 +145,7 @@ def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dic
     return {
         "u_rel": scores["u"]["rel"],
         "T_rms_k": scores["T"]["rms_K"],
+        "T_air_rms_k": scores["T"]["air"]["rms_K"],
         "T_departure": scores["T"]["departure_of_departures"],
         "p_departure": scores["p"]["rel_departure"],
         **coverage(solution, volume),

@@ -39,6 +39,12 @@ def score_table(scores: dict[str, Any]) -> Table:
     t = scores["T"]
     others = ", ".join(f"{trivial[k]} {v:.3f} K" for k, v in t["trivial"].items())
     table.add_row("temperature, rms", f"{t['rms_K']:.3f} K", others)
+    air = t["air"]
+    table.add_row(
+        "of the air, without walls' surfaces",
+        f"{air['rms_K']:.3f} K",
+        f"{trivial['inlet_plane']} {air['inlet_plane']:.3f} K",
+    )
     table.add_row("temperature, of its departure", _number(t["rel_departure"]), "mean at each height 1")
     for name, label in (("u", "velocity"), ("p", "pressure")):
         if scores[name] is None:

@@ -22,6 +22,11 @@ def score_rows(finding: Finding) -> list[tuple[str, ...]]:
             f"true mean along the view {trivial['y_mean']:.3f} K",
         ),
         (
+            "temperature of the air, without walls' surfaces, rms",
+            f"{t['air']['rms_K']:.3f} K",
+            f"inlet plane {t['air']['inlet_plane']:.3f} K",
+        ),
+        (
             "temperature, relative to its departure from each height's mean",
             _relative(t["rel_departure"]),
             "mean at each height: 1",

@@ -25,6 +25,7 @@ from core.estimate.temperature_levels import (
     free_vertices,
     last_correction,
     layer_means,
+    surfaces_std_k,
 )
 from core.estimate.uncertainty import Deviation, deviation
 from core.problem import Problem
@@ -74,7 +75,11 @@ def solution(
     variances = change.prior_variance_k2, change.variance_k2
     before, after = ((v[:, None, :] + (_DOUBT * moved_k) ** 2) * free for v in variances)
     bent = hydrostatic_variance_m4_s4(problem, z, before), hydrostatic_variance_m4_s4(problem, z, after)
-    of_points = change.point_k2 * free
+    shown_k = fields.excess_k + change_k
+    surfaces_k = surfaces_std_k(
+        analysis.data, analysis.layout, analysis.best.parameters.wall_excess_k, shown_k
+    )
+    of_points = change.point_k2 * free + np.square(surfaces_k)
     error = model_error_of(analysis)
     # The correction holds what the model has wrong in T.
     temperature = _deviation(analysis, "excess_k", None, (before + of_points, after + of_points))
@@ -85,7 +90,7 @@ def solution(
         x,
         y,
         z,
-        problem.scene.air.ambient_temperature_k + fields.excess_k + change_k,
+        problem.scene.air.ambient_temperature_k + shown_k,
         fields.pressure_m2_s2 + hydrostatic_m2_s2(problem, z, change_k),
         fields.velocity_m_s,
         temperature.std,

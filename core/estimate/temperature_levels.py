@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import ArrayLike, Float
 
 from core.estimate.discrepancy import Correction, temperature_correction
 from core.estimate.explained import explained
@@ -97,6 +97,34 @@ def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.n
         # A suspected heater shows the air before it.
         free[plane] = free[plane] * (1.0 - covered) if shown else np.minimum(free[plane] + covered, 1.0)
     return free
+
+
+def surfaces_std_k(
+    data: Observations,
+    layout: RoomLayout,
+    wall_excess_k: Float[ArrayLike, "6"],
+    excess_k: Float[np.ndarray, "vx vy vz"],
+) -> Float[np.ndarray, "vx vy vz"]:
+    """How far the surface of each wall of unknown temperature may be from what its vertices show; 0 elsewhere.
+
+    They show the air beside it, as an adiabatic wall would. The wall may be as far from that as the fit has it: its
+    heat is fitted, and what its surface has depends on how heat passes the layer on it, which no picture sees. A
+    measured plane sees it.
+    """
+    std_k = np.zeros(excess_k.shape)
+    unseen = (layout.heated > 0) & (layout.own == 0) & ~np.isin(WALLS, [plane.wall for plane in data.planes])
+    for wall in np.flatnonzero(unseen):
+        face = face_of(WALLS[wall])
+        first, second = (cell_matrix(layout.grid, a, excess_k.shape[a]) for a in AXES if a != face.axis)
+        bare = np.ones((first.shape[0], second.shape[0]))
+        for part in (*layout.inlets, *layout.outlets, *layout.heaters):
+            if part.wall == wall:
+                bare = bare * (1.0 - first @ np.pad(part.fraction, 1) @ second.T)
+        plane = _plane(face)
+        apart_k = np.abs(float(np.asarray(wall_excess_k)[wall]) - excess_k[plane])
+        # An edge belongs to two walls.
+        std_k[plane] = np.maximum(std_k[plane], bare * apart_k)
+    return std_k
 
 
 def _plane(face: Face) -> tuple[slice | int, ...]:

@@ -30,7 +30,7 @@ from app.volume.misread import misread
 from app.volume.scene import RigOptions, heater_of, parse_walls, room_scene
 from core.estimate.prior import room_prior
 from core.geometry import WallName
-from core.metrics import inner, rms
+from core.metrics import inner, off_walls, rms
 from core.problem import Problem
 from core.room.forward import room, room_fields
 from core.room.march import MarchSettings, march
@@ -134,7 +134,8 @@ def row_of(folder: Path, number: int, cells: int, by: str, walls: tuple[WallName
         "supplies": len(what.inlets),
         "heater": None if what.heater is None else ("stated" if stated else "not stated"),
         **fit,
-        "carried_T_rms_k": float(np.sqrt(np.mean(carried_k**2))),
+        "carried_T_rms_k": rms(carried_k),
+        "carried_T_air_rms_k": rms(off_walls(volume.temperature_k[:1] - volume.temperature_k)),
         "distrusts": "distrust the velocity" in said,
         "checks": "Check it" in said,
     }
@@ -182,10 +183,14 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     def share(of: np.ndarray) -> str:
         return f"{int(distrusts[of].sum())} of {int(of.sum())}"
 
+    def over_carried(what: str) -> float:
+        return float(np.median([row[f"{what}_rms_k"] / row[f"carried_{what}_rms_k"] for row in rows]))
+
     return {
         "rooms": len(rows),
         "u_median": float(np.median(u)),
-        "T_over_carried_median": float(np.median([row["T_rms_k"] / row["carried_T_rms_k"] for row in rows])),
+        "T_over_carried_median": over_carried("T"),
+        "T_air_over_carried_median": over_carried("T_air"),
         **{
             f"{name}_{what}": float(how([row[name] for row in rows]))
             for name in ("T_within", "u_within")

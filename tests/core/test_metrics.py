@@ -21,6 +21,14 @@ def test_wall_planes_with_a_layer_inside_the_first_cell_do_not_count(temperature
     assert score_temperature(wrong, temperature_k, 293.15)["rms_K"] == 0.0
 
 
+def test_the_airs_own_error_leaves_out_what_walls_show(temperature_k):
+    wrong = temperature_k + 0.5
+    wrong[0], wrong[..., 0], wrong[..., -1] = 0.0, 0.0, 0.0
+    scores = score_temperature(wrong, temperature_k, 293.15)
+    assert scores["rms_K"] > 10.0
+    assert scores["air"]["rms_K"] == pytest.approx(0.5)
+
+
 def test_the_mean_at_each_height_scores_one_in_departure(temperature_k):
     inner = temperature_k[:-1, 1:-1]
     found = np.broadcast_to(inner.mean(axis=(0, 1)), temperature_k.shape)

@@ -193,6 +193,7 @@ def _score_lines(scored: dict[str, Any]) -> list[ScoreResource]:
     temperature, velocity, pressure = scored["T"], scored["u"], scored["p"]
     lines = [
         ("T: rms error", temperature["rms_K"], "K"),
+        ("T: rms error of the air, without walls' surfaces", temperature["air"]["rms_K"], "K"),
         ("T: rms error of the still air everywhere, for comparison", temperature["trivial"]["ambient"], "K"),
         ("T: rms error of departures from each height's mean", temperature["departure_of_departures"], "1"),
     ]

@@ -8,7 +8,7 @@ import pytest
 from core.estimate.diagnostics import balances
 from core.estimate.observation import observations
 from core.estimate.prior import Prior, room_prior
-from core.estimate.temperature_levels import outlets_apart_k
+from core.estimate.temperature_levels import outlets_apart_k, surfaces_std_k
 from core.geometry import WALLS, Box, looking_along_y
 from core.problem import Problem
 from core.room.forward import room
@@ -70,6 +70,26 @@ def test_an_outlet_may_draw_from_any_place_along_its_wall_at_its_heights():
 
     # Three of the six places between the side walls are 2 K colder.
     assert outlets_apart_k(data, room, ()) == pytest.approx(1.0)
+
+
+def test_the_surface_of_an_unknown_wall_may_be_as_far_from_the_air_as_its_fitted_temperature():
+    given = problem(stated=False)
+    data, layout = observations(given, VERTICES), room(given.scene, 8, "constant").layout
+    walls_k = np.array([1.0, 2.0, 50.0, 50.0, 4.0, 8.0])
+    std_k = surfaces_std_k(data, layout, walls_k, np.full(VERTICES, 3.0))
+
+    assert std_k[-1, 3, 3] == pytest.approx(1.0)
+    assert std_k[4, 3, -1] == pytest.approx(5.0)
+    assert std_k[4, 3, 0] == pytest.approx(1.0)
+    # The camera sees through the walls of y, whose vertices show their own temperature; the supply covers most of the wall at its middle.
+    assert not std_k[1:-1, 0, 1:-1].any()
+    assert std_k[0, 4, 4] < 0.3
+    assert std_k[0, 1, 3] == pytest.approx(2.0)
+    assert not std_k[1:-1, 1:-1, 1:-1].any()
+
+    stated = problem(stated=True)
+    held = observations(stated, VERTICES), room(stated.scene, 8, "constant").layout
+    assert not surfaces_std_k(*held, walls_k, np.full(VERTICES, 3.0)).any()
 
 
 @pytest.mark.parametrize(("warmer_k", "said"), [(3.0, "W more"), (-3.0, "W less"), (0.2, None)])
