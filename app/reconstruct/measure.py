@@ -73,7 +73,8 @@ def measure(
         views.append(bursts)
         shifts.append(shift)
         drifts_px.append(drift_px)
-        notes.append(note + left_out + averaged)
+        whose = f"View {view.name!r}: " if len(scene.views) > 1 else ""
+        notes.append(whose + note + left_out + averaged)
     images: tuple[ImagePair, ...] = ()
     if scene.solve.data_term == "warped":
         images = tuple(_pair(view, n, captures, drifts_px[n]) for n, view in enumerate(scene.views))

@@ -196,7 +196,8 @@ def _outlined(finding: Finding) -> Iterable[Picture]:
 
 
 def _shifts(finding: Finding) -> Iterable[Picture]:
-    for shift in finding.shifts():
+    views = finding.experiment.settings.scene.views
+    for shift, view in zip(finding.shifts(), views, strict=True):
         without = (
             " What a motion of the camera would explain is taken out." if shift.motion is not None else ""
         )
@@ -205,7 +206,7 @@ def _shifts(finding: Finding) -> Iterable[Picture]:
         noise_px = float(np.median(standard_deviation_px(still)))
         yield Picture(
             as_data_uri(shift_figure(still)),
-            f"Measured shift, windows of {shift.window_px} px.{without} In the median "
+            f"{view.name}: measured shift, windows of {shift.window_px} px.{without} In the median "
             f"{1e3 * np.median(size_px):.2f} thousandths of a pixel, {np.median(size_px) / noise_px:.1f} times the "
             "noise of a window.",
         )

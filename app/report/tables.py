@@ -47,15 +47,18 @@ def _relative(value: float | None) -> str:
 def facts(experiment: Experiment) -> list[tuple[str, str]]:
     """The rig, and what was known of the room."""
     scene = experiment.settings.scene
-    view = scene.views[0]
     x, y, z = scene.room.size_m
-    cx, cy, cz = view.camera.position_m
-    rows = [
-        ("room", f"{x:g} x {y:g} x {z:g} m"),
-        ("camera", f"{view.camera.width_px} x {view.camera.height_px} px at ({cx:g}, {cy:g}, {cz:g}) m"),
-        ("averaging", f"{view.frames} frames, full well {view.noise.full_well_e:g} e-"),
-        ("light", f"{scene.light.kind}, {scene.light.pattern.kind} pattern"),
-    ]
+    rows = [("room", f"{x:g} x {y:g} x {z:g} m")]
+    for view in scene.views:
+        whose = f" of {view.name}" if len(scene.views) > 1 else ""
+        cx, cy, cz = view.camera.position_m
+        size = f"{view.camera.width_px} x {view.camera.height_px} px"
+        light = view.light or scene.light
+        rows += [
+            (f"camera{whose}", f"{size} at ({cx:g}, {cy:g}, {cz:g}) m, looks at {view.wall}"),
+            (f"averaging{whose}", f"{view.frames} frames, full well {view.noise.full_well_e:g} e-"),
+            (f"light{whose}", f"{light.kind}, {light.pattern.kind} pattern"),
+        ]
     if experiment.settings.information:
         rows.append(("level of information", experiment.settings.information))
     rows += [(known.kind.replace("_", " "), _describe(known)) for known in scene.boundary]

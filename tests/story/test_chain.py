@@ -103,7 +103,7 @@ def test_the_report_is_one_offline_file_with_every_picture(done):
         "Temperature: half of its 95 % interval",
         "Temperature minus truth",
         "mean images",
-        "Measured shift",
+        ": measured shift, windows of",
     )
     text = unescape(page)
     assert [words for words in pictures if words not in text] == []

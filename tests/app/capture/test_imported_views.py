@@ -1,6 +1,7 @@
 """Pictures of two cameras, brought one camera at a time: a capture is whole when both are there."""
 
 import shutil
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,12 @@ def files(folder, tmp_path_factory) -> dict[tuple[str, int], str]:
     }
 
 
+@pytest.fixture(scope="module")
+def drafted(folder) -> Path:
+    """The result of its own pictures."""
+    return reconstruct(folder, "draft").folder
+
+
 @pytest.fixture
 def empty(folder, tmp_path) -> Path:
     """The same room, with no capture."""
@@ -54,8 +61,17 @@ def empty(folder, tmp_path) -> Path:
     return tmp_path / "room"
 
 
-def test_a_capture_waits_for_the_second_camera_and_both_give_the_temperature(folder, files, empty):
-    own = score_experiment(folder, ROOM, reconstruct(folder, "draft").folder)["T"]["rms_K"]
+def test_a_report_says_whose_each_camera_s_shifts_and_motion_are(drafted):
+    page = unescape((drafted / "report.html").read_text())
+    for name, wall in (("camera", "y_max"), (SECOND, "x_max")):
+        assert f"{name}: measured shift" in page
+        assert f"View '{name}': " in page
+        assert f"camera of {name}" in page
+        assert f"m, looks at {wall}" in page
+
+
+def test_a_capture_waits_for_the_second_camera_and_both_give_the_temperature(folder, files, empty, drafted):
+    own = score_experiment(folder, ROOM, drafted)["T"]["rms_K"]
     first = run(
         "import", empty, "--view", "camera", "--reference", files["reference", 0], "--flow", files["flow", 0]
     )
