@@ -7,7 +7,7 @@ that all walls share or, where walls are unknown, the temperature that they shar
 import numpy as np
 from jaxtyping import Float
 
-from core.estimate.plane_openings import air_planes, still_vertices
+from core.estimate.plane_openings import profiles, still_vertices
 from core.known import leaving_excess_k
 from core.problem import Problem
 from core.room.boundary_conditions import RoomLayout
@@ -85,7 +85,7 @@ def heat_balance_m_s(
 
 def _room_excess_k(problem: Problem, leaving: float) -> float:
     """Mean excess temperature of the room's air: from a plane on a side wall, else that of the outflow."""
-    for plane in air_planes(problem):
+    for plane in profiles(problem):
         return (
             float(plane.temperature_k[still_vertices(plane)].mean()) - problem.scene.air.ambient_temperature_k
         )

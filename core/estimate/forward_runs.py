@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from core.estimate.marches import Marches, work
-from core.estimate.plane_openings import air_planes, still_vertices
+from core.estimate.plane_openings import profiles, still_vertices
 from core.estimate.prior import Prior
 from core.known import leaving_excess_k
 from core.problem import Problem
@@ -119,7 +119,7 @@ def first_profile_k(problem: Problem, coarse: Room) -> Float[np.ndarray, " nz"]:
     """Excess temperature of still air over height: a plane's profile, else the outflow's, else half the supply's."""
     heights = coarse.grid.centres_m(2)
     ambient = problem.scene.air.ambient_temperature_k
-    for plane in air_planes(problem):
+    for plane in profiles(problem):
         still = still_vertices(plane)
         count = np.maximum(still.sum(0), 1)
         profile = np.where(still, plane.temperature_k - ambient, 0.0).sum(0) / count

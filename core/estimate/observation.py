@@ -15,7 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from core.continuity import moved_as_air
 from core.data_error import PLANE_NOISE_K, WALL_MARGIN, alike_share
-from core.estimate.plane_openings import still_vertices
+from core.estimate.plane_openings import air_planes, still_vertices
 from core.geometry import Box, face_of
 from core.known import measured_outlets
 from core.motion import without_motion
@@ -225,7 +225,7 @@ def observations(problem: Problem, vertices: tuple[int, int, int]) -> Observatio
         scene,
         tuple(b for b in blocks if b is not None),
         moved,
-        problem.planes,
+        tuple(air_planes(problem)),
         problem.sensors,
         tuple(measured_outlets(scene)),
         vertices,

@@ -54,10 +54,15 @@ def plane_openings(plane: PlaneData) -> list[Inlet | Outlet]:
 
 
 def air_planes(problem: Problem) -> list[PlaneData]:
-    """Planes on side walls whose temperature is not stated: these have the temperature of the air beside them."""
+    """Planes on walls whose temperature is not stated. A plane on another wall shows what was stated, and no air."""
     walls = stated_walls(problem.scene)
     held = {name for name, wall in walls.items() if wall is not None and wall.thermal == "temperature"}
-    return [plane for plane in problem.planes if face_of(plane.wall).axis != 2 and plane.wall not in held]
+    return [plane for plane in problem.planes if plane.wall not in held]
+
+
+def profiles(problem: Problem) -> list[PlaneData]:
+    """Planes that show the air at every height."""
+    return [plane for plane in air_planes(problem) if face_of(plane.wall).axis != 2]
 
 
 def still_vertices(plane: PlaneData) -> Bool[np.ndarray, "first second"]:

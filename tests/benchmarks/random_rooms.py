@@ -8,18 +8,18 @@ misread as far as their deviations say. Rooms of even number are for choosing an
 number for figures; from 1000 on they are for nobody to look at.
 
     python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32] [--by openfoam]
-        [--views y,x]
-    python -m tests.benchmarks.random_rooms FOLDER --summary [--views y,x]
+        [--views y,x] [--information surveyed]
+    python -m tests.benchmarks.random_rooms FOLDER --summary [--views y,x] [--information surveyed]
     python -m tests.benchmarks.random_rooms FOLDER --stated  # everything is known, nothing is fitted
 
-Volumes and rows stay in FOLDER; a room that has its row by these views is not fitted again.
+Volumes and rows stay in FOLDER; a room that has its row by these views and this information is not fitted again.
 """
 
 import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from app.bench.room_fit import fit_row, problem_of
 from app.reconstruct.problem import with_scene
 from app.volume.file import read_volume
 from app.volume.misread import misread
-from app.volume.scene import RigOptions, heater_of, parse_walls, room_scene
+from app.volume.scene import Information, RigOptions, heater_of, parse_walls, room_scene
 from core.estimate.prior import room_prior
 from core.geometry import WallName
 from core.metrics import inner, off_walls, rms
@@ -118,18 +118,23 @@ def made(folder: Path, number: int, by: str) -> Path:
     return path
 
 
-def row_of(folder: Path, number: int, cells: int, by: str, walls: tuple[WallName, ...]) -> dict[str, Any]:
+def row_of(
+    folder: Path, number: int, cells: int, by: str, walls: tuple[WallName, ...], information: Information
+) -> dict[str, Any]:
     """Make the room if it is not there, fit it, and say how far off the result is and what it says of itself."""
     path, what = made(folder, number, by), drawn(number)
-    problem, volume = problem_of(path, "operator", "texture", "paper", number, walls=walls)
-    stated = what.heater is not None and number % 4 >= 2
-    problem = _entered(problem, number, heater_of(read_volume(path)) if stated else None)
+    problem, volume = problem_of(path, information, "texture", "paper", number, walls=walls)
+    stated = what.heater is not None and (information == "surveyed" or number % 4 >= 2)
+    # A surveyed room has its heater already.
+    add = stated and information == "operator"
+    problem = _entered(problem, number, heater_of(read_volume(path)) if add else None)
     fit = fit_row(problem, volume, RoomSettings(cells=cells))
     said = " ".join(fit["notes"])
     carried_k = inner(volume.temperature_k[:1] - volume.temperature_k)
     return {
         "room": number,
         "views": walls,
+        "information": information,
         "closure": json.loads(path.with_suffix(".json").read_text())["closure"],
         "supplies": len(what.inlets),
         "heater": None if what.heater is None else ("stated" if stated else "not stated"),
@@ -203,6 +208,11 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
+def _how(row: dict[str, Any]) -> tuple[tuple[WallName, ...], Information]:
+    """A row's views and information."""
+    return tuple(row.get("views", ("y_max",))), row.get("information", "operator")
+
+
 def main() -> None:
     """Make, fit and tell rooms."""
     parser = argparse.ArgumentParser(
@@ -214,6 +224,7 @@ def main() -> None:
     parser.add_argument("--cells", type=int, default=32)
     parser.add_argument("--by", choices=("airlens", "openfoam"), default="airlens")
     parser.add_argument("--views", default="y", help="the walls that are looked at, such as y,x")
+    parser.add_argument("--information", choices=get_args(Information), default="operator")
     parser.add_argument("--stated", action="store_true", help="everything stated, nothing fitted")
     parser.add_argument("--summary", action="store_true")
     options = parser.parse_args()
@@ -221,7 +232,8 @@ def main() -> None:
     rows = options.folder / ("stated.jsonl" if options.stated else "rows.jsonl")
     walls = parse_walls(options.views)
     done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
-    done = [row for row in done if tuple(row.get("views", ("y_max",))) == walls]
+    asked = walls, options.information
+    done = [row for row in done if _how(row) == asked]
     if options.summary:
         print(json.dumps(summary([row for row in done if row["room"] % 2])))
         return
@@ -229,7 +241,7 @@ def main() -> None:
         if any(row["room"] == number for row in done):
             continue
         how = options.folder, number, options.cells, options.by
-        row = stated_row(*how) if options.stated else row_of(*how, walls)
+        row = stated_row(*how) if options.stated else row_of(*how, *asked)
         with rows.open("a") as file:
             file.write(json.dumps(row) + "\n")
         print(json.dumps(row), flush=True)

@@ -10,10 +10,10 @@ from core.estimate.observation import observations
 from core.estimate.prior import room_prior
 from core.geometry import Box, looking_along_y
 from core.known import leaving_excess_k
-from core.problem import Problem, ShiftMeasurement
+from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.room.forward import room, room_fields
 from core.room.vertices import RoomFields
-from core.scene import FixedTexture, FlowModel, Inlet, Outlet, Patch, Scene, View
+from core.scene import FixedTexture, FlowModel, Inlet, Outlet, Patch, Scene, View, Wall
 
 VERTICES = (9, 9, 9)
 SUPPLY = Inlet(
@@ -78,6 +78,17 @@ def test_two_outlets_on_the_same_cells_share_what_leaves_there():
 )
 def test_what_leaves_is_the_mean_of_the_thermometers_weighted_as_the_flow_divides(outlets, leaving_k):
     assert leaving_excess_k(problem(*outlets)) == pytest.approx(leaving_k)
+
+
+@pytest.mark.parametrize("thermal", ["temperature", "adiabatic"])
+def test_a_plane_on_a_wall_of_stated_temperature_tells_nothing_of_the_air(thermal):
+    given, along_m = problem(HIGH), np.linspace(0.0, 2.0, 21)
+    still = np.zeros((21, 21))
+    plane = PlaneData("x_max", along_m, along_m, still + 300.0, still, np.zeros((21, 21, 3)))
+    wall = Wall(wall="x_max", thermal=thermal, temperature_k=300.0 if thermal == "temperature" else None)
+    given = Problem(replace(given.scene, boundary=(*given.scene.boundary, wall)), (), (plane,))
+
+    assert len(observations(given, VERTICES).planes) == (thermal == "adiabatic")
 
 
 def test_as_many_of_a_pictures_data_share_the_models_error_as_a_correlation_length_makes_alike():
