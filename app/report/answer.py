@@ -63,7 +63,7 @@ def _ventilation(finding: Finding) -> str:
     figures = {one.key: one for one in finding.indoor.quantities}
     upwards = figures["floor_to_ceiling"]
     higher = f"{abs(upwards.value):.1f} K {'warmer' if upwards.value > 0 else 'colder'}"
-    ceiling = f"the ceiling it is {higher} than at the floor"
+    ceiling = f"the ceiling the air is {higher} than at the floor"
     if "speed_mean" not in figures:
         return f"At {ceiling}; its velocity was not found, so nothing is told of draught and ventilation."
     if "air_changes" not in figures:

@@ -85,7 +85,7 @@ NAMES: Mapping[str, tuple[str, str]] = {
     "temperature_p95": ("temperature, 95th percentile", "°C"),
     "head_to_ankle": ("head (1.1 m) minus ankle (0.1 m), mean", "K"),
     "head_to_ankle_p95": ("head minus ankle, 95th percentile", "K"),
-    "floor_to_ceiling": ("ceiling minus floor, whole room", "K"),
+    "floor_to_ceiling": ("air at the ceiling minus air at the floor (0.1 m off), whole room", "K"),
     "speed_mean": ("speed, mean", "m/s"),
     "speed_p95": ("speed, 95th percentile", "m/s"),
     "draught_rate_mean": ("draught rate, mean", "%"),
@@ -225,11 +225,14 @@ def _heights(solution: Solution, there: np.ndarray) -> Figures:
     head, ankle = (at_height(solution.temperature_k, solution.z_m, height) for height in (HEAD_M, ANKLE_M))
     upwards_k = np.asarray(head - ankle, np.float64)[there.any(axis=2)]
     upwards_k = upwards_k[~np.isnan(upwards_k)]
-    levels_k = np.asarray(np.nanmean(solution.temperature_k.astype(np.float64), axis=(0, 1)))
+    # Vertices on a wall have its surface's temperature, which is not the air's.
+    air_k = solution.temperature_k[1:-1, 1:-1].astype(np.float64)
+    ends_m = solution.z_m[0] + ANKLE_M, solution.z_m[-1] - ANKLE_M
+    low_k, high_k = np.interp(ends_m, solution.z_m, np.nanmean(air_k, axis=(0, 1)))
     return {
         "head_to_ankle": float(upwards_k.mean()),
         "head_to_ankle_p95": float(np.percentile(upwards_k, 95)),
-        "floor_to_ceiling": float(levels_k[-1] - levels_k[0]),
+        "floor_to_ceiling": float(high_k - low_k),
     }
 
 

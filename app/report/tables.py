@@ -50,14 +50,14 @@ def facts(experiment: Experiment) -> list[tuple[str, str]]:
     x, y, z = scene.room.size_m
     rows = [("room", f"{x:g} x {y:g} x {z:g} m")]
     for view in scene.views:
-        whose = f" of {view.name}" if len(scene.views) > 1 else ""
+        name, whose = (view.name, f"{view.name}: ") if len(scene.views) > 1 else ("camera", "")
         cx, cy, cz = view.camera.position_m
         size = f"{view.camera.width_px} x {view.camera.height_px} px"
         light = view.light or scene.light
         rows += [
-            (f"camera{whose}", f"{size} at ({cx:g}, {cy:g}, {cz:g}) m, looks at {view.wall}"),
-            (f"averaging{whose}", f"{view.frames} frames, full well {view.noise.full_well_e:g} e-"),
-            (f"light{whose}", f"{light.kind}, {light.pattern.kind} pattern"),
+            (name, f"{size} at ({cx:g}, {cy:g}, {cz:g}) m, looks at {view.wall}"),
+            (f"{whose}averaging", f"{view.frames} frames, full well {view.noise.full_well_e:g} e-"),
+            (f"{whose}light", f"{light.kind}, {light.pattern.kind} pattern"),
         ]
     if experiment.settings.information:
         rows.append(("level of information", experiment.settings.information))

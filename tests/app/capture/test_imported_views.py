@@ -66,7 +66,7 @@ def test_a_report_says_whose_each_camera_s_shifts_and_motion_are(drafted):
     for name, wall in (("camera", "y_max"), (SECOND, "x_max")):
         assert f"{name}: measured shift" in page
         assert f"View '{name}': " in page
-        assert f"camera of {name}" in page
+        assert f"{name}: averaging" in page
         assert f"m, looks at {wall}" in page
 
 

@@ -20,7 +20,7 @@ from core.occupied import OccupiedZone
 from core.result import Solution
 from core.scene import FixedTexture, Inlet, Outlet, Scene, View
 from core.setting import SettingError
-from tests.core.ventilation.rooms import INLET, OUTLET, packaged, plug
+from tests.core.ventilation.rooms import INLET, OUTLET, box, packaged, plug
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(4.0, 3.0, 2.0))
 VIEW = View(camera=looking_along_y(position_m=(2.0, -5.0, 1.0), width_px=64, height_px=48, focal_px=100.0))
@@ -61,7 +61,7 @@ def deviating():
 @pytest.mark.parametrize(
     ("key", "expected"),
     [
-        ("head_to_ankle", 2.0), ("head_to_ankle_p95", 2.0), ("floor_to_ceiling", 4.0), ("speed_mean", 0.1),
+        ("head_to_ankle", 2.0), ("head_to_ankle_p95", 2.0), ("floor_to_ceiling", 3.6), ("speed_mean", 0.1),
         ("speed_p95", 0.1),
         # 0.1 m/s through 6 m2; a room of 24 m3.
         ("flow", 2160.0), ("air_changes", 90.0), ("nominal_time", 24 / 0.6 / 60),
@@ -70,6 +70,15 @@ def deviating():
 )  # fmt: skip
 def test_figures_by_hand(plain, key, expected):
     assert plain[key].value == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_a_warm_floor_is_not_the_air_over_it():
+    velocity_m_s = np.zeros((7, 7, 41, 3))
+    velocity_m_s[..., 0] = 0.1
+    found = box(velocity_m_s)
+    kelvin = 295.0 + 2.0 * np.broadcast_to(found.z_m, found.temperature_k.shape)
+    kelvin = np.where(found.z_m == 0.0, kelvin + 10.0, kelvin)
+    assert values(replace(found, temperature_k=kelvin))["floor_to_ceiling"].value == pytest.approx(3.6)
 
 
 @pytest.mark.parametrize(
