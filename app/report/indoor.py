@@ -226,13 +226,12 @@ def _heights(solution: Solution, there: np.ndarray) -> Figures:
     upwards_k = np.asarray(head - ankle, np.float64)[there.any(axis=2)]
     upwards_k = upwards_k[~np.isnan(upwards_k)]
     # Vertices on a wall have its surface's temperature, which is not the air's.
-    air_k = solution.temperature_k[1:-1, 1:-1].astype(np.float64)
-    ends_m = solution.z_m[0] + ANKLE_M, solution.z_m[-1] - ANKLE_M
-    low_k, high_k = np.interp(ends_m, solution.z_m, np.nanmean(air_k, axis=(0, 1)))
+    top = at_height(solution.temperature_k, solution.z_m, solution.z_m[-1] - solution.z_m[0] - ANKLE_M)
+    low_k, high_k = (float(np.nanmean(plane[1:-1, 1:-1].astype(np.float64))) for plane in (ankle, top))
     return {
         "head_to_ankle": float(upwards_k.mean()),
         "head_to_ankle_p95": float(np.percentile(upwards_k, 95)),
-        "floor_to_ceiling": float(high_k - low_k),
+        "floor_to_ceiling": high_k - low_k,
     }
 
 

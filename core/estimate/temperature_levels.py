@@ -12,6 +12,7 @@ from core.estimate.observation import Observations
 from core.estimate.prior import Prior
 from core.geometry import WALLS, Box, Face, face_of
 from core.room.boundary_conditions import RoomLayout
+from core.room.openings import Opening
 from core.room.room_grid import AXES
 from core.room.vertices import RoomFields, cell_matrix
 from core.scene import Patch
@@ -92,8 +93,7 @@ def free_vertices(layout: RoomLayout, shape: tuple[int, int, int]) -> Float[np.n
     for wall in np.flatnonzero(layout.own):
         free[_plane(face_of(WALLS[wall]))] = 0.0
     for heater, shown in zip(layout.heaters, layout.shown, strict=True):
-        first, second = (cell_matrix(layout.grid, a, shape[a]) for a in AXES if a != heater.axis)
-        covered, plane = first @ np.pad(heater.fraction, 1) @ second.T, _plane(face_of(WALLS[heater.wall]))
+        covered, plane = _covered(layout, heater, shape), _plane(face_of(WALLS[heater.wall]))
         # A suspected heater shows the air before it.
         free[plane] = free[plane] * (1.0 - covered) if shown else np.minimum(free[plane] + covered, 1.0)
     return free
@@ -114,17 +114,20 @@ def surfaces_std_k(
     std_k = np.zeros(excess_k.shape)
     unseen = (layout.heated > 0) & (layout.own == 0) & ~np.isin(WALLS, [plane.wall for plane in data.planes])
     for wall in np.flatnonzero(unseen):
-        face = face_of(WALLS[wall])
-        first, second = (cell_matrix(layout.grid, a, excess_k.shape[a]) for a in AXES if a != face.axis)
-        bare = np.ones((first.shape[0], second.shape[0]))
+        plane = _plane(face_of(WALLS[wall]))
+        apart_k = np.abs(float(np.asarray(wall_excess_k)[wall]) - excess_k[plane])
         for part in (*layout.inlets, *layout.outlets, *layout.heaters):
             if part.wall == wall:
-                bare = bare * (1.0 - first @ np.pad(part.fraction, 1) @ second.T)
-        plane = _plane(face)
-        apart_k = np.abs(float(np.asarray(wall_excess_k)[wall]) - excess_k[plane])
+                apart_k = apart_k * (1.0 - _covered(layout, part, excess_k.shape))
         # An edge belongs to two walls.
-        std_k[plane] = np.maximum(std_k[plane], bare * apart_k)
+        std_k[plane] = np.maximum(std_k[plane], apart_k)
     return std_k
+
+
+def _covered(layout: RoomLayout, part: Opening, shape: tuple[int, ...]) -> Float[np.ndarray, "first second"]:
+    """Share of each vertex of its wall that an opening or a heater covers."""
+    first, second = (cell_matrix(layout.grid, a, shape[a]) for a in AXES if a != part.axis)
+    return first @ np.pad(part.fraction, 1) @ second.T
 
 
 def _plane(face: Face) -> tuple[slice | int, ...]:

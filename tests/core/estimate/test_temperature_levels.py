@@ -81,9 +81,9 @@ def test_the_surface_of_an_unknown_wall_may_be_as_far_from_the_air_as_its_fitted
     assert std_k[-1, 3, 3] == pytest.approx(1.0)
     assert std_k[4, 3, -1] == pytest.approx(5.0)
     assert std_k[4, 3, 0] == pytest.approx(1.0)
-    # The camera sees through the walls of y, whose vertices show their own temperature. The supply covers most of the
-    # middle of its wall.
+    # The camera sees through the walls of y: their vertices show the fitted temperature.
     assert not std_k[1:-1, 0, 1:-1].any()
+    # A vertex in the supply, and one beside it.
     assert std_k[0, 4, 4] < 0.3
     assert std_k[0, 1, 3] == pytest.approx(2.0)
     assert not std_k[1:-1, 1:-1, 1:-1].any()
