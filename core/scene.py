@@ -353,7 +353,7 @@ Driving = Inlet | Heater
 class FlowModel:
     """Transport of momentum and heat: molecular, given effective coefficients, or a closure."""
 
-    transport: Literal["auto", "molecular", "given", "zero_equation", "k_epsilon"] = "auto"
+    transport: Literal["auto", "molecular", "given", "zero_equation", "k_epsilon", "large_eddies"] = "auto"
     """How momentum and heat spread."""
     viscosity_m2_s: float | None = None
     """With `given`: effective viscosity, 1e-9 to 1e3."""

@@ -11,7 +11,7 @@ from core.estimate.marches import Marches
 from core.estimate.parameter_fit import Background
 from core.estimate.posterior import Analysis, model_error_of
 from core.estimate.unstated_heat import Suspect, likeliest
-from core.room.forward import Room
+from core.room.forward import LARGE_EDDIES, Room
 
 # Share of the measured shifts (rms) that a fitted room leaves unexplained. At 48 cells rooms with the right closure
 # leave 8 to 22 %, rooms with a wrong one 29 to 40 %.
@@ -40,6 +40,14 @@ def suspected_heat(
     if not settings.use_images or not background.prior.unknown_walls() or not lacks_something(analysis):
         return None
     return likeliest(background, analysis.data, settings, marches)
+
+
+def worth_large_eddies(analysis: Analysis, settings: RoomSettings) -> bool:
+    """Whether the room should be fitted with its large eddies marched too: closures leave much, or it is stated."""
+    transport = analysis.problem.scene.flow.transport
+    if not settings.use_images or transport not in ("auto", LARGE_EDDIES):
+        return False
+    return transport == LARGE_EDDIES or left_over(analysis) > _TRY_CLOSURE
 
 
 def promising_closure(analysis: Analysis, coarse: Room) -> str | None:

@@ -11,6 +11,7 @@ from core.estimate.forward_runs import Derivatives
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior
 from core.geometry import WALLS, Box, Face, face_of
+from core.known import stated_walls
 from core.room.boundary_conditions import RoomLayout
 from core.room.openings import Opening
 from core.room.room_grid import AXES
@@ -105,19 +106,25 @@ def surfaces_std_k(
     wall_excess_k: Float[ArrayLike, "6"],
     excess_k: Float[np.ndarray, "vx vy vz"],
 ) -> Float[np.ndarray, "vx vy vz"]:
-    """How far the surface of each wall of unknown temperature may be from what its vertices show; 0 elsewhere.
+    """How far the surface of each wall may be from what its vertices show, one standard deviation; 0 elsewhere.
 
-    They show the air beside it, as an adiabatic wall would. The wall may be as far from that as the fit has it: its
-    heat is fitted, and what its surface has depends on how heat passes the layer on it, which no picture sees. A
-    measured plane sees it.
+    A wall of stated temperature shows it, and may be off by its stated deviation. One of unknown temperature shows
+    the air beside it, as an adiabatic wall would. It may be as far from that as the fit has it: its heat is fitted,
+    and what its surface has depends on how heat passes the layer on it, which no picture sees. A measured plane sees
+    it.
     """
     std_k = np.zeros(excess_k.shape)
-    unseen = (layout.heated > 0) & (layout.own == 0) & ~np.isin(WALLS, [plane.wall for plane in data.planes])
-    for wall in np.flatnonzero(unseen):
-        plane = _plane(face_of(WALLS[wall]))
-        apart_k = np.abs(float(np.asarray(wall_excess_k)[wall]) - excess_k[plane])
+    seen = [plane.wall for plane in data.planes]
+    for index, (name, wall) in enumerate(stated_walls(data.scene).items()):
+        plane = _plane(face_of(name))
+        if wall is not None and wall.temperature_k is not None:
+            apart_k = np.full_like(excess_k[plane], wall.temperature_std_k)
+        elif layout.heated[index] and not layout.own[index] and name not in seen:
+            apart_k = np.abs(float(np.asarray(wall_excess_k)[index]) - excess_k[plane])
+        else:
+            continue
         for part in (*layout.inlets, *layout.outlets, *layout.heaters):
-            if part.wall == wall:
+            if part.wall == index:
                 apart_k = apart_k * (1.0 - _covered(layout, part, excess_k.shape))
         # An edge belongs to two walls.
         std_k[plane] = np.maximum(std_k[plane], apart_k)

@@ -3,7 +3,7 @@
 README.md has the equations, the scheme and the published cases that it is checked against. Reading order:
 
     where things are    room_grid, solids, wall_planes, openings, boundary_conditions
-    one time step       transport, momentum, pressure, obstructed, k_epsilon, closure, pace, step
+    one time step       transport, momentum, pressure, obstructed, k_epsilon, closure, eddies, pace, step
     a steady state      level, march
     what is seen of it  vertices, forward
 """

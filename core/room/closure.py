@@ -107,7 +107,7 @@ class ConstantClosure(AbstractAlgebraicClosure):
 
     def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
         """The constant."""
-        return _same_on_walls(jnp.full(grid.cells, 1.0) * (self.eddy_m2_s + self.molecular_m2_s))
+        return same_on_walls(jnp.full(grid.cells, 1.0) * (self.eddy_m2_s + self.molecular_m2_s))
 
 
 class ZeroEquationClosure(AbstractAlgebraicClosure):
@@ -121,7 +121,7 @@ class ZeroEquationClosure(AbstractAlgebraicClosure):
         """0.03874 |u| l plus the molecular one."""
         u, v, w = (face_mean(velocity[a], a) for a in AXES)
         speed = jnp.sqrt(u**2 + v**2 + w**2)
-        return _same_on_walls(0.03874 * self.scale * speed * self.wall_distance_m + self.molecular_m2_s)
+        return same_on_walls(0.03874 * self.scale * speed * self.wall_distance_m + self.molecular_m2_s)
 
 
 class KEpsilonClosure(AbstractClosure):
@@ -152,7 +152,7 @@ class KEpsilonClosure(AbstractClosure):
     def viscosity(self, state: KEpsilonState | None, velocity: Velocity, grid: RoomGrid) -> Viscosity:
         """C_mu k^2 / epsilon, and the log law on walls."""
         if state is None:
-            return _same_on_walls(jnp.full(grid.cells, 1.0) * self.molecular_m2_s)
+            return same_on_walls(jnp.full(grid.cells, 1.0) * self.molecular_m2_s)
         cells = self.scale * state.eddy_m2_s() + self.molecular_m2_s
         return Viscosity(cells, energy_walls(state.energy_m2_s2, grid, self.molecular_m2_s))
 
@@ -196,6 +196,7 @@ def _even_walls(grid: RoomGrid) -> tuple[tuple[Plane, Plane], ...]:
     return tuple((jnp.ones(grid.plane(a)), jnp.ones(grid.plane(a))) for a in AXES)
 
 
-def _same_on_walls(cells_m2_s: Cells) -> Viscosity:
+def same_on_walls(cells_m2_s: Cells) -> Viscosity:
+    """The viscosity of the cells, and on the walls that of the cells beside them."""
     walls = tuple((first_plane(cells_m2_s, a), last_plane(cells_m2_s, a)) for a in AXES)
     return Viscosity(cells_m2_s, walls)

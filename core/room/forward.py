@@ -15,6 +15,7 @@ from core.room.closure import (
     ZeroEquationClosure,
     wall_distance_m,
 )
+from core.room.eddies import LargeEddies
 from core.room.openings import opening_edges_m
 from core.room.room_grid import AXES, RoomGrid, Velocity, room_grid
 from core.room.step import Flow, RoomModel, air_at_rest, room_model
@@ -29,6 +30,8 @@ from core.scene import Scene
 
 # nu_t = 0.0058 U sqrt(A) is the mean of k-epsilon's over the reference rooms.
 _EDDY_SHARE = 0.0058
+# The closure's name of a room whose large eddies are marched.
+LARGE_EDDIES = "large_eddies"
 
 
 class Room(eqx.Module):
@@ -82,6 +85,8 @@ class Room(eqx.Module):
             )
             eddy = flow.viscosity_m2_s or _EDDY_SHARE * self.speed_m_s * area**0.5
             return ConstantClosure(scale * eddy, molecular)
+        if self.closure == LARGE_EDDIES:
+            return LargeEddies(molecular)
         if self.closure == "molecular":
             return ConstantClosure(0.0 * scale, molecular)
         return KEpsilonClosure(scale, molecular, self.scene.air.prandtl)

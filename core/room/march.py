@@ -2,8 +2,8 @@
 
 The march ends when the mean velocity of a window differs from that of the window before by less than `tolerance`
 (relative rms), at `longest_s`, or after `most_steps`. The result is the mean over the last fifth of the time, since
-flows on coarse grids may oscillate. If a value becomes infinite, the march returns to the last window and halves
-the Courant number, once.
+flows on coarse grids may oscillate; over more of it where large eddies are marched. If a value becomes infinite, the
+march returns to the last window and halves the Courant number, once.
 
 Time is what the room's cells have lived through in the mean: each takes its own steps (`core.room.pace`).
 
@@ -20,6 +20,7 @@ from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
 from core.result import Outcome
+from core.room.eddies import LargeEddies, stirred
 from core.room.level import level_correction
 from core.room.pace import StepLimits, step_limits
 from core.room.room_grid import Cells
@@ -38,9 +39,10 @@ class MarchSettings:
 
     `least_s`: no march is called steady before it; just after a change of the supply windows hardly differ.
     `level_ahead_s`: how far the layers' heat balance is extrapolated after each window (`core.room.level`; 0: not at
-    all), from `settle_s` to two thirds of `longest_s`. No window begins after `most_steps`. A march that ends by its
-    longest time counts as converged if its last windows differ by less than `settled`. One that is not `steady` is
-    true in time: all cells take the same steps, and no wave is damped.
+    all), from `settle_s` to two thirds of `longest_s`, or to where the mean begins. No window begins after
+    `most_steps`. A march that ends by its longest time counts as converged if its last windows differ by less than
+    `settled`. One that is not `steady` is true in time: all cells take the same steps, and no wave is damped.
+    `mean_share`: the result is the mean over this last part of the time.
     """
 
     longest_s: float = 60.0
@@ -54,6 +56,7 @@ class MarchSettings:
     chunk_steps: int = 20
     most_steps: int = 1_000_000
     steady: bool = True
+    mean_share: float = 0.2
 
     def __post_init__(self) -> None:
         if not 0.0 < self.courant <= 0.5:
@@ -69,7 +72,7 @@ class MarchSettings:
 
 
 class March(eqx.Module):
-    """The end of a march: last state, mean of the last fifth, how it ended, model time and steps."""
+    """The end of a march: last state, mean of the last part, how it ended, model time and steps."""
 
     last: Flow
     mean: Flow
@@ -82,7 +85,7 @@ class March(eqx.Module):
 class MarchState(eqx.Module):
     """A march between two windows: all that the next one depends on, and what is kept of those before.
 
-    `means` are of the last fifth of the windows so far.
+    `means` are of the last windows so far, by `MarchSettings.mean_share`.
     """
 
     flow: Flow
@@ -134,21 +137,17 @@ def _after_window(
         return replace(state, courant=0.5 * state.courant), None
     model_s, windows = state.model_s + seconds, state.windows + 1
     change = float(_relative_change(mean, state.means[-1])) if state.means else float("inf")
-    outcome = None
+    outcome, levelled = None, min(2 / 3, 1.0 - settings.mean_share)
     if change < settings.tolerance and model_s > settings.least_s - 1e-6:
         outcome = Outcome.converged
-    elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
+    elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * levelled:
         # As an array the time ahead is no part of the compiled program.
         ahead_s = jnp.asarray(settings.level_ahead_s, jnp.float32)
         flow = _levelled(flow, (flow.excess_k - start.excess_k) / lived_s, model, ahead_s)
-    # Only the last fifth is needed, whenever the march ends.
-    means = (*state.means, mean)[-_fifth(windows) :]
+    # Only the last ones are needed, whenever the march ends.
+    means = (*state.means, mean)[-max(1, round(windows * settings.mean_share)) :]
     steps = state.steps + taken
     return MarchState(flow, means, state.courant, model_s, steps, windows, change), outcome
-
-
-def _fifth(windows: int) -> int:
-    return max(1, round(windows / 5))
 
 
 def window(
@@ -163,11 +162,15 @@ def window(
     lived_s = jnp.zeros(model.grid.cells)
     most = settings.chunk_steps
     pairs, first = most, state.windows == 0
+    boundary = model.boundary
     while left_s > _NOTHING * settings.window_s:
         check_stop()
         # Air at rest allows any step, but it does not stay at rest; objects' heat starts plumes.
         careful = _FIRST_SHARE if first and model.boundary.solids is not None else 1.0
         longest_s = min(settings.window_s / (2 * most), left_s / (2 * pairs))
+        if isinstance(model.closure, LargeEddies):
+            disturbed = stirred(boundary, jnp.int32(state.steps + taken))
+            model = eqx.tree_at(lambda m: m.boundary, model, disturbed)
         limits = step_limits(careful * state.courant, longest_s, steady=settings.steady, first=first)
         flow, mean, own_s = advance_chunk(flow, model, jnp.int32(pairs), limits)
         passed_s = float(own_s.mean())

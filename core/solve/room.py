@@ -7,12 +7,21 @@ closures. core/estimate/README.md has the method.
 
 from dataclasses import replace
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
 from core.checkpoint import digest
-from core.estimate.alternatives import KEEP_HEAT, left_over, promising_closure, suspected_heat
+from core.estimate.alternatives import (
+    KEEP_HEAT,
+    left_over,
+    promising_closure,
+    suspected_heat,
+    worth_large_eddies,
+)
 from core.estimate.diagnostics import another_closure, missing_heat
 from core.estimate.forward_runs import (
+    EDDIES_LONGER,
     Derivatives,
     ForwardRun,
     RoomSettings,
@@ -23,7 +32,7 @@ from core.estimate.forward_runs import (
 )
 from core.estimate.image_noise import with_noise_seen
 from core.estimate.levenberg_marquardt import fine_search
-from core.estimate.marches import Marches
+from core.estimate.marches import Marches, work
 from core.estimate.observation import Observations, observations
 from core.estimate.parameter_fit import Background, coarse_fit, fine_fit
 from core.estimate.parameter_step import Vector
@@ -36,8 +45,11 @@ from core.estimate.unstated_heat import with_suspected_heat
 from core.problem import Problem
 from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
-from core.room.forward import carried_over, closure_name, room
+from core.room.forward import LARGE_EDDIES, carried_over, closure_name, room
 from core.watch import Watch
+
+# Rounds of a fit with large eddies, as a rule.
+_EDDY_ROUNDS = 3
 
 
 def solve_room(problem: Problem, settings: RoomSettings = RoomSettings(), watch: Watch = Watch()) -> Solution:
@@ -87,13 +99,21 @@ def analyse(background: Background, problem: Problem, settings: RoomSettings, ma
     """
     analysis = fitted_room(background, problem, settings, marches)
     notes: tuple[str, ...] = ()
+    closure = background.coarse.closure
     name = promising_closure(analysis, background.coarse) if settings.use_images else None
     if name is not None:
         again = fitted_room(
             background_of(background.problem, settings, marches, name), problem, settings, marches
         )
         if left_over(again) < left_over(analysis):
-            notes = (another_closure(name, left_over(again), background.coarse.closure, left_over(analysis)),)
+            notes = (another_closure(name, left_over(again), closure, left_over(analysis)),)
+            analysis, closure = again, name
+    if worth_large_eddies(analysis, settings):
+        again = with_large_eddies(analysis, settings, marches)
+        if analysis.problem.scene.flow.transport == LARGE_EDDIES:
+            analysis = again
+        elif left_over(again) < left_over(analysis):
+            notes = (another_closure(LARGE_EDDIES, left_over(again), closure, left_over(analysis)),)
             analysis = again
     suspect = suspected_heat(analysis, background, settings, marches)
     if suspect is not None:
@@ -157,6 +177,27 @@ def fitted_room(
         best=best,
         layout=fine.layout,
         outlet_std_k=outlets_apart_k(data, best.fields, pairs),
+    )
+
+
+def with_large_eddies(analysis: Analysis, settings: RoomSettings, marches: Marches) -> Analysis:
+    """The room fitted again with its large eddies marched (`core.room.eddies`), from where `analysis` ended.
+
+    Every entry is taken as it was entered, and what nobody entered as `analysis` has it. Derivatives are those of
+    `analysis`: eddies differ from march to march, so a difference of two marches is no derivative.
+    """
+    data, kept = analysis.data, [n for n, name in enumerate(analysis.prior.names()) if name != "log_closure"]
+    found = np.where(analysis.prior.gaussian(), analysis.posterior.vector, 0.0)[kept]
+    prior = eqx.tree_at(lambda p: p.std.log_closure, analysis.prior, jnp.float32(0.0))
+    slopes = analysis.derivatives
+    slopes = Derivatives(slopes.start, [slopes.others[n] for n in kept], slopes.apart[np.ix_(kept, kept)])
+    fine = room(analysis.problem.scene, settings.cells, LARGE_EDDIES)
+    marches.expect((1 + _EDDY_ROUNDS) * EDDIES_LONGER * work(fine.grid, settings.refine_s))
+    where, flow, doing = prior.parameters(found), analysis.best.flow.last, "march the room's large eddies"
+    first = march_under(fine, where, flow, settings.refine_s, data.vertices, marches, doing=doing)
+    fit = fine_fit(fine, prior, data, found, first, slopes, settings, marches)
+    return replace(
+        analysis, prior=prior, posterior=fit.posterior, derivatives=slopes, best=fit.room, layout=fine.layout
     )
 
 

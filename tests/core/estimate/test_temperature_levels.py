@@ -1,5 +1,7 @@
 """What leaves by an outlet, and the heat that a measured level asks for."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -88,9 +90,19 @@ def test_the_surface_of_an_unknown_wall_may_be_as_far_from_the_air_as_its_fitted
     assert std_k[0, 1, 3] == pytest.approx(2.0)
     assert not std_k[1:-1, 1:-1, 1:-1].any()
 
-    stated = problem(stated=True)
-    held = observations(stated, VERTICES), room(stated.scene, 8, "constant").layout
-    assert not surfaces_std_k(*held, walls_k, np.full(VERTICES, 3.0)).any()
+
+def test_the_surface_of_a_stated_wall_may_be_off_by_its_stated_deviation():
+    held = problem(stated=True)
+    warm = Wall(wall="x_min", thermal="temperature", temperature_k=295.0, temperature_std_k=0.4)
+    boundary = (warm, *(part for part in held.scene.boundary if getattr(part, "wall", None) != "x_min"))
+    held = replace(held, scene=replace(held.scene, boundary=boundary))
+    layout = room(held.scene, 8, "constant").layout
+    std_k = surfaces_std_k(observations(held, VERTICES), layout, np.zeros(6), np.full(VERTICES, 3.0))
+
+    assert std_k[0, 1, 5] == pytest.approx(0.4)
+    # A vertex in the supply; the other walls are adiabatic and show the air.
+    assert std_k[0, 4, 4] < 0.1
+    assert not std_k[1:].any()
 
 
 @pytest.mark.parametrize(("warmer_k", "said"), [(3.0, "W more"), (-3.0, "W less"), (0.2, None)])

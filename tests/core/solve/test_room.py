@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
-from core.estimate.alternatives import promising_closure
+from core.estimate.alternatives import promising_closure, worth_large_eddies
 from core.estimate.forward_runs import Derivatives, march_under, perturbed
 from core.estimate.heaters import heaters_by_march
 from core.estimate.levenberg_marquardt import fine_search
@@ -31,6 +31,7 @@ from core.solve.room import (
     background_of,
     fitted_room,
     solve_room,
+    with_large_eddies,
 )
 from core.watch import Watch
 
@@ -287,6 +288,44 @@ def test_another_closure_is_tried_where_it_leaves_less_of_the_images(
     assert promising_closure(where(0.9, 1.0), coarse) == wanted
     # A room that leaves half of the images is doubted whatever the coarse one says.
     assert promising_closure(where(0.5, 0.0), coarse) == wanted
+
+
+@pytest.mark.parametrize(
+    ("transport", "share", "worth"),
+    [
+        ("auto", 0.5, True),
+        ("auto", 0.9, False),
+        ("k_epsilon", 0.5, False),
+        ("large_eddies", 0.9, True),
+    ],
+)
+def test_large_eddies_are_marched_where_closures_leave_much_of_the_images_or_where_they_are_stated(
+    truth: Solution,
+    under_k_epsilon: tuple[Analysis, Room],
+    transport: Literal["auto", "k_epsilon", "large_eddies"],
+    share: float,
+    worth: bool,
+):
+    fitted = under_k_epsilon[0]
+    problem = replace(fitted.problem, scene=scene(SUPPLY, FlowModel(transport=transport)))
+    explains_k = share * np.asarray(truth.temperature_k - 293.15)
+    fitted = eqx.tree_at(lambda s: s.best.fields.excess_k, replace(fitted, problem=problem), explains_k)
+    assert worth_large_eddies(fitted, SHORT) == worth
+    assert not worth_large_eddies(fitted, replace(SHORT, use_images=False))
+
+
+def test_the_room_with_large_eddies_keeps_its_entries_and_has_no_closure_to_fit(
+    under_k_epsilon: tuple[Analysis, Room],
+):
+    fitted = under_k_epsilon[0]
+    marches = Marches()
+    found = with_large_eddies(fitted, replace(SHORT, rounds=1), marches)
+    assert found.prior.names() == [name for name in fitted.prior.names() if name != "log_closure"]
+    assert len(found.posterior.vector) == len(found.derivatives.others) == len(found.prior.names())
+    eddies = [row for row in marches.history if row["doing"] == "march the room's large eddies"]
+    assert len(eddies) == 1
+    assert found.best.flow.last.turbulence is None
+    assert np.isfinite(solution(found, 0.0, use_images=True).velocity_std_m_s).all()
 
 
 # Panels on no strip that is searched, nor as wide or as deep as one; the last is a room without any.
