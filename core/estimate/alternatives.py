@@ -44,10 +44,16 @@ def suspected_heat(
 
 def worth_large_eddies(analysis: Analysis, settings: RoomSettings) -> bool:
     """Whether the room should be fitted with its large eddies marched too: closures leave much, or it is stated."""
-    transport = analysis.problem.scene.flow.transport
-    if not settings.use_images or transport not in ("auto", LARGE_EDDIES):
+    if not settings.use_images:
         return False
-    return transport == LARGE_EDDIES or left_over(analysis) > _TRY_CLOSURE
+    if stated_eddies(analysis):
+        return True
+    return analysis.problem.scene.flow.transport == "auto" and left_over(analysis) > _TRY_CLOSURE
+
+
+def stated_eddies(analysis: Analysis) -> bool:
+    """Whether the scene states that large eddies are to be marched."""
+    return analysis.problem.scene.flow.transport == LARGE_EDDIES
 
 
 def promising_closure(analysis: Analysis, coarse: Room) -> str | None:

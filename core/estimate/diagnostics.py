@@ -126,7 +126,8 @@ def missing_heat(strip: SuspectedHeater, likeness: float) -> str:
     low, high = strip.patch.lower_m[0], strip.patch.upper_m[0]
     return (
         f"Heat on the floor at x = {low:.1f} to {high:.1f} m would change the pictures as what is left unexplained "
-        f"differs (correlation {likeness:.2f}). Look for a source that rises there, at any depth, and state it."
+        f"differs (correlation {likeness:.2f}), but a room that is fitted with it leaves nearly as much. Look for a "
+        "source that rises there, at any depth; if there is none, something else is not as stated."
     )
 
 

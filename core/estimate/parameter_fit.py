@@ -22,7 +22,7 @@ from core.room.forward import Room
 # Ratios of a room's misfit to the least misfit so far. Above the first a step is rejected: smaller rises may come
 # from a march that is not quite steady yet. A round above the second has gained nothing; after `PATIENCE` of those
 # the rounds end. The room that is returned is below the last.
-_REJECTED, GAIN, _ACCEPTED = 1.5, 0.99, 1.05
+REJECTED, GAIN, _ACCEPTED = 1.5, 0.99, 1.05
 PATIENCE = 2
 
 
@@ -128,7 +128,7 @@ def fine_fit(
         new, left = fine_round(
             n, fine, prior, data, best, least, derivatives, grid_difference, settings, marches
         )
-        if left > _REJECTED:
+        if left > REJECTED:
             best = best.with_posterior_of(new)
             break
         step = farthest(new.posterior.vector, best.posterior.vector)
@@ -173,6 +173,6 @@ def fine_round(
         )
         values = by_name(prior, vector)
         marches.record({"doing": doing, "round": n + 2.0 - share, "misfit_left": left, **values})
-        if left <= _REJECTED:
+        if left <= REJECTED:
             break
     return new, left

@@ -16,6 +16,7 @@ from core.estimate.alternatives import (
     KEEP_HEAT,
     left_over,
     promising_closure,
+    stated_eddies,
     suspected_heat,
     worth_large_eddies,
 )
@@ -34,8 +35,8 @@ from core.estimate.image_noise import with_noise_seen
 from core.estimate.levenberg_marquardt import fine_search
 from core.estimate.marches import Marches, work
 from core.estimate.observation import Observations, observations
-from core.estimate.parameter_fit import Background, coarse_fit, fine_fit
-from core.estimate.parameter_step import Vector
+from core.estimate.parameter_fit import REJECTED, Background, coarse_fit, fine_fit
+from core.estimate.parameter_step import Vector, misfit_ratio
 from core.estimate.plane_openings import with_plane_openings
 from core.estimate.posterior import Analysis, solution
 from core.estimate.prior import room_prior
@@ -48,7 +49,7 @@ from core.room.boundary_conditions import RoomLayout
 from core.room.forward import LARGE_EDDIES, carried_over, closure_name, room
 from core.watch import Watch
 
-# Rounds of a fit with large eddies, as a rule.
+# Most rounds of a fit with large eddies: a march of them costs some four times what one of a closure does.
 _EDDY_ROUNDS = 3
 
 
@@ -110,7 +111,7 @@ def analyse(background: Background, problem: Problem, settings: RoomSettings, ma
             analysis, closure = again, name
     if worth_large_eddies(analysis, settings):
         again = with_large_eddies(analysis, settings, marches)
-        if analysis.problem.scene.flow.transport == LARGE_EDDIES:
+        if stated_eddies(analysis):
             analysis = again
         elif left_over(again) < left_over(analysis):
             notes = (another_closure(LARGE_EDDIES, left_over(again), closure, left_over(analysis)),)
@@ -184,7 +185,8 @@ def with_large_eddies(analysis: Analysis, settings: RoomSettings, marches: March
     """The room fitted again with its large eddies marched (`core.room.eddies`), from where `analysis` ended.
 
     Every entry is taken as it was entered, and what nobody entered as `analysis` has it. Derivatives are those of
-    `analysis`: eddies differ from march to march, so a difference of two marches is no derivative.
+    `analysis`: eddies differ from march to march, so a difference of two marches is no derivative. A room whose first
+    march would be rejected as a step of the fit is not corrected, unless the scene asks for eddies.
     """
     data, kept = analysis.data, [n for n, name in enumerate(analysis.prior.names()) if name != "log_closure"]
     found = np.where(analysis.prior.gaussian(), analysis.posterior.vector, 0.0)[kept]
@@ -195,7 +197,9 @@ def with_large_eddies(analysis: Analysis, settings: RoomSettings, marches: March
     marches.expect((1 + _EDDY_ROUNDS) * EDDIES_LONGER * work(fine.grid, settings.refine_s))
     where, flow, doing = prior.parameters(found), analysis.best.flow.last, "march the room's large eddies"
     first = march_under(fine, where, flow, settings.refine_s, data.vertices, marches, doing=doing)
-    fit = fine_fit(fine, prior, data, found, first, slopes, settings, marches)
+    rejected = misfit_ratio(data, first, analysis.best) > REJECTED and not stated_eddies(analysis)
+    rounds = 0 if rejected else min(settings.rounds, _EDDY_ROUNDS)
+    fit = fine_fit(fine, prior, data, found, first, slopes, replace(settings, rounds=rounds), marches)
     return replace(
         analysis, prior=prior, posterior=fit.posterior, derivatives=slopes, best=fit.room, layout=fine.layout
     )
