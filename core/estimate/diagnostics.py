@@ -178,8 +178,8 @@ def other_way(likeness: float) -> list[str]:
 def another_closure(name: str, left: float, stated: str, stated_left: float) -> str:
     """A sentence that says which closure was taken, and why."""
     return (
-        f"The images are explained better under the {name} closure ({100 * left:.0f} % of the shifts left) than "
-        f"under {stated} ({100 * stated_left:.0f} %): it was taken. State flow.transport to keep one."
+        f"The images are explained better with {name} as the model of turbulence ({100 * left:.0f} % of the shifts "
+        f"left) than with {stated} ({100 * stated_left:.0f} %): it was taken. State flow.transport to keep one."
     )
 
 

@@ -15,6 +15,7 @@ from core.known import leaving_excess_k
 from core.problem import Problem
 from core.result import Outcome, Solution
 from core.room.boundary_conditions import RoomParameters
+from core.room.closure import KEpsilonClosure
 from core.room.forward import LARGE_EDDIES, Room, room, room_fields
 from core.room.march import March, MarchSettings, MarchState
 from core.room.step import Flow, RoomModel
@@ -153,21 +154,12 @@ def march_under(
     """
     model = where.model(parameters)
     flow = eqx.tree_at(lambda f: f.velocity, flow, set_normal(flow.velocity, model.boundary))
-    eddies = where.closure == LARGE_EDDIES
-    if eddies:
-        # They have no turbulence of a closure, in whose room a march may begin.
-        flow, seconds = Flow(flow.velocity, flow.excess_k, flow.pressure_m2_s2, None), EDDIES_LONGER * seconds
-    turnover_ratio = where.turnover_ratio
-    timing = MarchSettings(
-        longest_s=seconds * turnover_ratio,
-        least_s=min(seconds, _RESPONSE_S) * turnover_ratio,
-        window_s=min(15.0, seconds) * turnover_ratio,
-        settle_s=0.15 * seconds * turnover_ratio,
-        level_ahead_s=20.0 * turnover_ratio,
-        most_steps=round(_STEPS * float(np.prod(where.grid.cells)) ** (1 / 3) * seconds),
-    )
-    if eddies:
-        timing = replace(timing, **_EDDIES, most_steps=_TRUE_TIME * timing.most_steps)
+    if not isinstance(model.closure, KEpsilonClosure):
+        # The march may begin in a room of k-epsilon, whose turbulence no other closure has.
+        flow = Flow(flow.velocity, flow.excess_k, flow.pressure_m2_s2, None)
+    if where.closure == LARGE_EDDIES:
+        seconds = EDDIES_LONGER * seconds
+    timing = _timing(where, seconds)
     counted = work(where.grid, seconds)
 
     def passed(state: MarchState) -> None:
@@ -180,6 +172,22 @@ def march_under(
     if doing is not None:
         marches.record({"doing": doing, "model_s": done.model_s, "change": done.change})
     return ForwardRun(parameters, done, room_fields(done.mean, model, where.layout, vertices))
+
+
+def _timing(where: Room, seconds: float) -> MarchSettings:
+    """How to march so long; `seconds` are those of the reference room."""
+    turnover_ratio = where.turnover_ratio
+    steady = MarchSettings(
+        longest_s=seconds * turnover_ratio,
+        least_s=min(seconds, _RESPONSE_S) * turnover_ratio,
+        window_s=min(15.0, seconds) * turnover_ratio,
+        settle_s=0.15 * seconds * turnover_ratio,
+        level_ahead_s=20.0 * turnover_ratio,
+        most_steps=round(_STEPS * float(np.prod(where.grid.cells)) ** (1 / 3) * seconds),
+    )
+    if where.closure != LARGE_EDDIES:
+        return steady
+    return replace(steady, **_EDDIES, most_steps=_TRUE_TIME * steady.most_steps)
 
 
 def _growing(where: Room, state: MarchState, model: RoomModel, vertices: tuple[int, int, int]) -> Solution:
@@ -236,9 +244,7 @@ def run_under_other_closure(
     marches: Marches,
 ) -> RoomFields:
     """A restart of the run `base` under another closure: the difference is an error of turbulence modelling."""
-    last = base.flow.last
-    flow = Flow(last.velocity, last.excess_k, last.pressure_m2_s2, None)
     another = room(where.scene, settings.coarse_cells, other_closure(where))
     doing = f"march the coarse room by the closure {another.closure}"
     parameters, seconds = prior.parameters(vector), settings.restarts_s(prior)
-    return march_under(another, parameters, flow, seconds, vertices, marches, doing=doing).fields
+    return march_under(another, parameters, base.flow.last, seconds, vertices, marches, doing=doing).fields
