@@ -219,6 +219,12 @@ class Patch:
             )
 
     @property
+    def centre_m(self) -> Vector2:
+        """Its middle."""
+        one_m, other_m = (0.5 * (low + high) for low, high in zip(self.lower_m, self.upper_m, strict=True))
+        return one_m, other_m
+
+    @property
     def area_m2(self) -> float:
         """Area of the rectangle."""
         return (self.upper_m[0] - self.lower_m[0]) * (self.upper_m[1] - self.lower_m[1])

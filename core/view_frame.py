@@ -160,6 +160,12 @@ def looked_along(scene: Scene) -> tuple[int, ...]:
     return tuple(sorted({face_of(view.wall).axis for view in scene.views}))
 
 
+def told_on_floor(scene: Scene) -> tuple[int, ...]:
+    """The floor's axes, 0 for x and 1 for y, that a view does not look along: it tells where along it air rises."""
+    along = set(looked_along(scene))
+    return tuple(axis for axis in (0, 1) if along - {axis})
+
+
 def _three(values: list[float]) -> tuple[float, float, float]:
     x, y, z = values
     return x, y, z

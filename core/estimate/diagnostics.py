@@ -1,5 +1,7 @@
 """Sentences for the operator: heat balance, entries that the images contradict, what not to trust."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
@@ -13,6 +15,7 @@ from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.scene import Driving, Heater, Inlet
+from core.view_frame import told_on_floor
 
 # One room in twenty has an entry called wrong that is as right as its stated deviation says.
 _FALSE_ALARMS = 0.05
@@ -23,6 +26,8 @@ _MISSING_SHARE = 0.1
 _DOUBTFUL = 0.5
 # Correlation of the measured shifts with those of the room as stated, below which they went the other way.
 _OTHER_WAY = -0.5
+# The place of heat is called uncertain if it spans more than so many panels: each overlaps its neighbours by half.
+_WIDE = 2.0
 # A floor panel is reported if it is warmer, or colder, than the air by at least this.
 _SUSPICIOUS_K = 8.0
 
@@ -61,7 +66,9 @@ def contradictions(
     for n, heater in enumerate(heaters):
         by_k = float(fitted.heater_excess_k[n] - prior.mean.heater_excess_k[n])
         if isinstance(heater, SuspectedHeater):
-            said += suspicion(heater, float(fitted.heater_excess_k[n]) - (leaving_excess_k(problem) or 0.0))
+            said += suspicion(
+                problem, heater, float(fitted.heater_excess_k[n]) - (leaving_excess_k(problem) or 0.0)
+            )
         elif (name := f"heater_excess_k[{n}]") in believed:
             where = f"the heater on {heater.patch.wall}"
             said.append(_warmer(where, by_k, heater.temperature_k, believed[name]))
@@ -107,28 +114,49 @@ def objects_heat(
     return said
 
 
-def suspicion(heater: SuspectedHeater, by_k: float) -> list[str]:
-    """A sentence about a strip of floor that the fit made `by_k` warmer than the air; none if it is small."""
+def suspicion(problem: Problem, heater: SuspectedHeater, by_k: float) -> list[str]:
+    """A sentence about a panel of floor that the fit made `by_k` warmer than the air; none if it is small."""
     if abs(by_k) < _SUSPICIOUS_K:
         return []
     lower, upper = heater.patch.lower_m, heater.patch.upper_m
     size = " x ".join(f"{high - low:.2f}" for low, high in zip(lower, upper, strict=True))
+    place, assumed = _place_on_floor(problem, heater)
     return [
         f"The images ask for {'heat' if by_k > 0 else 'cold'} that is not in the scene: as of a floor panel of "
-        f"{size} m, {abs(by_k):.0f} K {'warmer' if by_k > 0 else 'colder'} than the air, at x = {lower[0]:.1f} to "
-        f"{upper[0]:.1f} m. How deep in the room it is was not looked for; the middle was assumed. State it "
-        "as a heater."
+        f"{size} m, {abs(by_k):.0f} K {'warmer' if by_k > 0 else 'colder'} than the air, at {place}. {assumed}"
+        "State it as a heater."
     ]
 
 
-def missing_heat(strip: SuspectedHeater, likeness: float) -> str:
-    """A sentence about a strip of floor where heat may be missing that the room's fit could not make use of."""
-    low, high = strip.patch.lower_m[0], strip.patch.upper_m[0]
+def missing_heat(problem: Problem, panel: SuspectedHeater, likeness: float) -> str:
+    """A sentence about a panel of floor where heat may be missing that the room's fit could not make use of."""
+    place, assumed = _place_on_floor(problem, panel)
     return (
-        f"Heat on the floor at x = {low:.1f} to {high:.1f} m would change the pictures as what is left unexplained "
-        f"differs (correlation {likeness:.2f}), but a room that is fitted with it leaves nearly as much. Look for a "
-        "source that rises there, at any depth; if there is none, something else is not as stated."
+        f"Heat on the floor at {place} would change the pictures as what is left unexplained differs (correlation "
+        f"{likeness:.2f}), but a room that is fitted with it leaves nearly as much. {assumed}Look for a source that "
+        "rises there; if there is none, something else is not as stated."
     )
+
+
+def where_else(panel: SuspectedHeater, spans_m: Iterable[tuple[int, float, float]]) -> tuple[str, ...]:
+    """A sentence for each axis along which heat may as well stand elsewhere than on this panel."""
+    width_m = np.subtract(panel.patch.upper_m, panel.patch.lower_m)
+    return tuple(
+        f"The images do not tell well where along {'xy'[axis]} this heat stands: anywhere from {low_m:.1f} to "
+        f"{high_m:.1f} m is as likely (95 %)."
+        for axis, low_m, high_m in spans_m
+        if high_m - low_m > _WIDE * width_m[axis]
+    )
+
+
+def _place_on_floor(problem: Problem, panel: SuspectedHeater) -> tuple[str, str]:
+    """Where a panel lies along the axes that some view tells, and a sentence about an axis that none tells."""
+    bounds = zip("xy", panel.patch.lower_m, panel.patch.upper_m, strict=True)
+    spans = [f"{axis} = {low:.1f} to {high:.1f} m" for axis, low, high in bounds]
+    told = told_on_floor(problem.scene)
+    unseen = "".join(axis for n, axis in enumerate("xy") if n not in told)
+    assumed = f"No view tells where along {unseen} it is; the middle was assumed. " if unseen else ""
+    return ", ".join(spans[n] for n in told), assumed
 
 
 def misfit(data: Observations, seen: Explained, error: ModelError) -> list[str]:

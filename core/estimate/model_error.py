@@ -10,7 +10,8 @@ fit could not take up; two models that are equally wrong by themselves differ by
 wrong. <> is a mean over a correlation length. k is the ratio of what the fitted room leaves of the images, beyond
 their noise, to what d / sqrt(2) would leave: expected to be 1, known within a factor e, and moved by the likelihood.
 Where the images do not tell two models apart it stays 1. A room that leaves far more of the
-images than models differ in lacks something, such as a heater that nobody stated.
+images than models differ in lacks something, such as a heater that nobody stated. Where a room with such a heater
+explains the images about as well, the truth may be either: the two are one more pair, whose size is 1.
 
 d at a point is one draw of three components. An error whose variance is known from three squares has Student's t
 distribution with nu = 3 (Gosset, Biometrika 6 (1908)), whose standard deviation is sqrt(3) times as large. That is
@@ -45,15 +46,15 @@ _FALSE_ALARMS = 0.05
 
 
 class ModelError(eqx.Module):
-    """Pairs of rooms that differ in the model alone, how each would move the parameters, and the size k.
+    """Pairs of rooms that may be wrong by what they differ in, how each would move the parameters, and its size.
 
-    `moved` is in prior deviations. `left_ratio` is what the room leaves of the images beyond their noise, over what
-    the pairs would leave, both rms: k without the prior.
+    `moved` is in prior deviations. `size` is k, and 1 for a pair of rivals. `left_ratio` is what the room leaves of
+    the images beyond their noise, over what the models' pairs would leave, both rms: k without the prior.
     """
 
     pairs: tuple[Pair, ...]
     moved: Float[np.ndarray, "pairs active"]
-    size: float
+    size: Float[np.ndarray, " pairs"]
     left_ratio: float
 
     @property
@@ -64,7 +65,7 @@ class ModelError(eqx.Module):
     @property
     def moves(self) -> Float[np.ndarray, " active"]:
         """How far what the model has wrong moves each parameter, one standard deviation, in prior deviations."""
-        return self.size * np.sqrt(_EACH * np.sum(self.moved**2, axis=0))
+        return np.sqrt(_EACH * np.sum((self.size[:, None] * self.moved) ** 2, axis=0))
 
     def deviation(
         self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]
@@ -80,15 +81,15 @@ class ModelError(eqx.Module):
         self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]
     ) -> Float[np.ndarray, "vx vy vz ..."]:
         variance = np.zeros(getattr(self.pairs[0][0], name).shape)
-        for (one, other), moved in zip(self.pairs, self.moved, strict=True):
+        for (one, other), moved, size in zip(self.pairs, self.moved, self.size, strict=True):
             apart = getattr(other, name) - getattr(one, name) - np.tensordot(moved, derivatives, axes=1)
             if apart.ndim == 3:
                 # The mean of p at each height follows that of T, of which the last correction knows more.
                 apart = apart - apart.mean((0, 1))
             # A mean over one correlation length: one standard deviation to each side.
             width = [0.5 * LENGTH_SHARE * n for n in apart.shape[:3]] + [0.0] * (apart.ndim - 3)
-            variance += _EACH * ndimage.gaussian_filter(apart**2, width)
-        return self.size**2 * variance
+            variance += size**2 * _EACH * ndimage.gaussian_filter(apart**2, width)
+        return variance
 
 
 def model_error(
@@ -97,8 +98,10 @@ def model_error(
     derivatives: Derivatives,
     pairs: tuple[Pair, ...],
     found: RoomFields,
+    rivals: Pair | None = None,
 ) -> ModelError:
-    """The error of the model that ended in the room `found`."""
+    """The error of the model that ended in the room `found`; either of two `rivals` may be the truth."""
+    models, pairs = len(pairs), pairs if rivals is None else (*pairs, rivals)
     jacobian = derivatives.per_deviation(data.predicted).T
     between = [data.predicted(other) - data.predicted(one) for one, other in pairs]
     if len(posterior.deviation):
@@ -114,9 +117,10 @@ def model_error(
     seen = images(data, found)
     apart = np.stack([s - jacobian @ m for s, m in zip(between, moved, strict=True)])
     shown = data.values()[2] == IMAGES
-    apart = np.stack([unshared(data, of[shown]) for of in apart])
+    apart = np.stack([unshared(data, of[shown]) for of in apart[:models]])
     left, noise = seen.left_px, seen.variance_px2
-    size = size_of(left, noise, apart, data.alike()[shown])
+    size = np.ones(len(pairs))
+    size[:models] = size_of(left, noise, apart, data.alike()[shown])
     return ModelError(pairs, moved, size, _left_ratio(left, noise, apart))
 
 

@@ -43,7 +43,8 @@ class Analysis(eqx.Module):
 
     `stated_room` is the room as stated. `coarse`, `first` (on the fine grid) and `other` (another closure) are under
     the same parameters. `best` is the run under the fitted ones.
-    `outlet_std_k` is how far what leaves may be from the air at the outlets' height.
+    `outlet_std_k` is how far what leaves may be from the air at the outlets' height. `rival` is the room that was
+    fitted with heat that nobody stated and explains the images about as well; None if there is none.
     """
 
     problem: Problem
@@ -58,6 +59,7 @@ class Analysis(eqx.Module):
     best: ForwardRun
     layout: RoomLayout
     outlet_std_k: float
+    rival: RoomFields | None = None
 
 
 def solution(
@@ -124,9 +126,11 @@ def sentences(analysis: Analysis, error: ModelError, doubt: float, moved_k: floa
 
 
 def model_error_of(analysis: Analysis) -> ModelError:
-    """What the model of the air has wrong: first as two closures differ, then as two grids do."""
+    """What the model has wrong: as two closures differ, and two grids, and as the room and its rival do."""
+    found = analysis.best.fields
     pairs = (analysis.coarse, analysis.other), (analysis.coarse, analysis.first)
-    return model_error(analysis.data, analysis.posterior, analysis.derivatives, pairs, analysis.best.fields)
+    rival = None if analysis.rival is None else (found, analysis.rival)
+    return model_error(analysis.data, analysis.posterior, analysis.derivatives, pairs, found, rival)
 
 
 def doubt_of_velocity(analysis: Analysis, error: ModelError) -> float:

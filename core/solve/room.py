@@ -14,13 +14,14 @@ import numpy as np
 from core.checkpoint import digest
 from core.estimate.alternatives import (
     KEEP_HEAT,
+    lacks_something,
     left_over,
     promising_closure,
     stated_eddies,
     suspected_heat,
     worth_large_eddies,
 )
-from core.estimate.diagnostics import another_closure, missing_heat
+from core.estimate.diagnostics import another_closure, missing_heat, where_else
 from core.estimate.forward_runs import (
     EDDIES_LONGER,
     Derivatives,
@@ -95,11 +96,12 @@ def background_of(
 def analyse(background: Background, problem: Problem, settings: RoomSettings, marches: Marches) -> Solution:
     """The solution for the shifts of `problem`, which may be another measurement of the background's room.
 
-    If another closure, or a heater that nobody stated, may explain the images better, that room is fitted as well and
-    the better one is taken.
+    If another closure, a heater that nobody stated, or large eddies may explain the images better, that room is
+    fitted as well and the better one is taken. Heat comes before eddies: these need what drives them.
     """
     analysis = fitted_room(background, problem, settings, marches)
-    notes: tuple[str, ...] = ()
+    of_closure: tuple[str, ...] = ()
+    of_heat: tuple[str, ...] = ()
     closure = background.coarse.closure
     name = promising_closure(analysis, background.coarse) if settings.use_images else None
     if name is not None:
@@ -107,28 +109,33 @@ def analyse(background: Background, problem: Problem, settings: RoomSettings, ma
             background_of(background.problem, settings, marches, name), problem, settings, marches
         )
         if left_over(again) < left_over(analysis):
-            notes = (another_closure(name, left_over(again), closure, left_over(analysis)),)
+            of_closure = (another_closure(name, left_over(again), closure, left_over(analysis)),)
             analysis, closure = again, name
+    suspect = suspected_heat(analysis, background, settings, marches)
+    if suspect is not None:
+        warm = with_suspected_heat(background.problem, suspect)
+        name = background.coarse.closure
+        again = fitted_room(background_of(warm, settings, marches, name), problem, settings, marches)
+        if left_over(again) < KEEP_HEAT * left_over(analysis):
+            of_closure, of_heat = (), where_else(suspect.panel, suspect.spans_m)
+            analysis, closure, suspect = again, name, None
+        else:
+            analysis = replace(analysis, rival=again.best.fields)
     if worth_large_eddies(analysis, settings):
         again = with_large_eddies(analysis, settings, marches)
         if stated_eddies(analysis):
             analysis = again
         elif left_over(again) < left_over(analysis):
-            notes = (another_closure(LARGE_EDDIES, left_over(again), closure, left_over(analysis)),)
+            of_closure = (another_closure(LARGE_EDDIES, left_over(again), closure, left_over(analysis)),)
             analysis = again
-    suspect = suspected_heat(analysis, background, settings, marches)
-    if suspect is not None:
-        warm = with_suspected_heat(background.problem, suspect)
-        again = fitted_room(
-            background_of(warm, settings, marches, background.coarse.closure), problem, settings, marches
-        )
-        if left_over(again) < KEEP_HEAT * left_over(analysis):
-            notes, analysis = (), again
-        else:
-            notes = (*notes, missing_heat(suspect.strip, suspect.likeness))
+    if suspect is not None and lacks_something(analysis):
+        said = missing_heat(problem, suspect.panel, suspect.likeness)
+        of_heat = (said, *where_else(suspect.panel, suspect.spans_m))
     doing = "take the room that was found"
     marches.record({"doing": doing, **supplied(analysis.layout, analysis.best)})
-    found = solution(analysis, marches.elapsed_s, use_images=settings.use_images, notes=notes)
+    found = solution(
+        analysis, marches.elapsed_s, use_images=settings.use_images, notes=(*of_closure, *of_heat)
+    )
     return replace(found, history=tuple(marches.history))
 
 
@@ -184,12 +191,13 @@ def fitted_room(
 def with_large_eddies(analysis: Analysis, settings: RoomSettings, marches: Marches) -> Analysis:
     """The room fitted again with its large eddies marched (`core.room.eddies`), from where `analysis` ended.
 
-    Every entry is taken as it was entered, and what nobody entered as `analysis` has it. Derivatives are those of
-    `analysis`: eddies differ from march to march, so a difference of two marches is no derivative. A room whose first
-    march would be rejected as a step of the fit is not corrected, unless the scene asks for eddies.
+    Every entry is taken as it was entered, and what nobody entered, such as heat, as `analysis` has it. Derivatives
+    are those of `analysis`: eddies differ from march to march, so a difference of two marches is no derivative. A
+    room whose first march would be rejected as a step of the fit is not corrected, unless the scene asks for eddies.
     """
     data, kept = analysis.data, [n for n, name in enumerate(analysis.prior.names()) if name != "log_closure"]
-    found = np.where(analysis.prior.gaussian(), analysis.posterior.vector, 0.0)[kept]
+    unentered = analysis.prior.gaussian() | analysis.prior.suspected()
+    found = np.where(unentered, analysis.posterior.vector, 0.0)[kept]
     prior = eqx.tree_at(lambda p: p.std.log_closure, analysis.prior, jnp.float32(0.0))
     slopes = analysis.derivatives
     slopes = Derivatives(slopes.start, [slopes.others[n] for n in kept], slopes.apart[np.ix_(kept, kept)])

@@ -134,7 +134,7 @@ def test_a_room_is_doubted_for_what_is_more_than_noise_and_more_than_models_diff
     noise, ratio, found_k, doubted
 ):
     data = observations(seen(4.0, noise), VERTICES)
-    error = ModelError((), np.zeros((0, 0)), 1.0, ratio)
+    error = ModelError((), np.zeros((0, 0)), np.zeros(0), ratio)
 
     said = " ".join(misfit(data, explained(data, room_of(found_k)), error))
 

@@ -17,9 +17,9 @@ from core.estimate.observation import observations
 from core.estimate.parameter_fit import Background, coarse_fit, fine_fit
 from core.estimate.parameter_names import by_name
 from core.estimate.parameter_step import misfit_ratio
-from core.estimate.posterior import Analysis, solution
+from core.estimate.posterior import Analysis, doubt_of_velocity, model_error_of, solution
 from core.estimate.prior import Prior, room_prior
-from core.geometry import Box, looking_along_y
+from core.geometry import Box, WallName, looking_along_y
 from core.motion import CameraMotion
 from core.problem import PlaneData, Problem, ShiftMeasurement
 from core.rays.operator import build
@@ -33,6 +33,7 @@ from core.solve.room import (
     solve_room,
     with_large_eddies,
 )
+from core.view_frame import turn_to
 from core.watch import Watch
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(2.0, 2.0, 2.0))
@@ -61,11 +62,18 @@ def deviations(prior: Prior, row: dict) -> np.ndarray:
     return np.array(moved) / std
 
 
+def looking_at(wall: WallName) -> View:
+    """A view of a wall, by a camera 7 m from the room."""
+    turn = turn_to(wall)
+    x_m, y_m, z_m = turn.point(ROOM.centre_m)
+    camera = looking_along_y(position_m=(x_m, y_m - 9.0, z_m), width_px=200, height_px=200, focal_px=900.0)
+    return View(name=wall, wall=wall, camera=turn.back().optics(camera))
+
+
 def scene(supply: Inlet, flow: FlowModel = FlowModel(transport="given", viscosity_m2_s=2e-3)) -> Scene:
-    camera = looking_along_y(position_m=(1.0, -8.0, 1.0), width_px=200, height_px=200, focal_px=900.0)
     return Scene(
         room=ROOM,
-        views=(View(camera=camera),),
+        views=(looking_at("y_max"),),
         light=FixedTexture(),
         flow=flow,
         boundary=(
@@ -105,13 +113,17 @@ def truth() -> Solution:
 
 
 def measured(where: Scene, truth: Solution, noise_px: float) -> Problem:
-    """What a camera and a plane of thermometers see of the truth, with the scene as entered."""
+    """What the cameras and a plane of thermometers see of the truth, with the scene as entered."""
     centres = np.stack(np.meshgrid(np.arange(8.0, 200, 16), np.arange(8.0, 200, 16)), -1).reshape(-1, 2)
-    operator = build(where, 0, centres, truth.temperature_k.shape, 16.0)
     excess = where.air.excess_refractivity(jnp.asarray(truth.temperature_k - 293.15, jnp.float32))
-    shift = np.asarray(eqx.filter_jit(lambda o, e: o.apply(e))(operator, excess))
-    shift = shift + noise_px * np.random.default_rng(1).normal(size=shift.shape)
-    information = np.broadcast_to(np.eye(2) / noise_px**2, (len(shift), 2, 2)).copy()
+    information = np.broadcast_to(np.eye(2) / noise_px**2, (len(centres), 2, 2)).copy()
+    noise = np.random.default_rng(1)
+
+    def seen(view: int) -> ShiftMeasurement:
+        operator = build(where, view, centres, truth.temperature_k.shape, 16.0)
+        shift = np.asarray(eqx.filter_jit(lambda o, e: o.apply(e))(operator, excess))
+        return ShiftMeasurement(centres, shift + noise_px * noise.normal(size=shift.shape), information, 16)
+
     plane = PlaneData(
         "x_min",
         truth.y_m,
@@ -120,7 +132,7 @@ def measured(where: Scene, truth: Solution, noise_px: float) -> Problem:
         np.asarray(truth.pressure_m2_s2[0], float),
         np.asarray(truth.velocity_m_s[0], float),
     )
-    return Problem(where, (ShiftMeasurement(centres, shift, information, 16),), (plane,))
+    return Problem(where, tuple(seen(view) for view in range(len(where.views))), (plane,))
 
 
 def after_the_camera_moved(problem: Problem) -> Problem:
@@ -328,31 +340,60 @@ def test_the_room_with_large_eddies_keeps_its_entries_and_has_no_closure_to_fit(
     assert np.isfinite(solution(found, 0.0, use_images=True).velocity_std_m_s).all()
 
 
-# Panels on no strip that is searched, nor as wide or as deep as one; the last is a room without any.
-@pytest.mark.parametrize("panel", [((1.27, 0.7), (1.75, 1.1)), ((0.93, 0.9), (1.37, 1.4)), None])
+def test_the_velocity_may_be_wrong_by_what_a_room_that_explains_as_much_has_there(
+    under_k_epsilon: tuple[Analysis, Room],
+):
+    fitted = under_k_epsilon[0]
+    fields, corner = fitted.best.fields, (slice(0, 5), slice(0, 5))
+    plume_m_s = np.zeros_like(np.asarray(fields.velocity_m_s))
+    plume_m_s[corner] = [0.0, 0.0, 0.4]
+    rival = eqx.tree_at(lambda f: f.velocity_m_s, fields, np.asarray(fields.velocity_m_s) + plume_m_s)
+    alone, beside = (solution(replace(fitted, rival=other), 0.0, use_images=True) for other in (None, rival))
+
+    assert np.median(beside.velocity_std_m_s[..., 2][corner]) > 0.25
+    far = np.s_[-5:, -5:]
+    np.testing.assert_allclose(beside.velocity_std_m_s[far], alone.velocity_std_m_s[far], rtol=0.3)
+    expected = [doubt_of_velocity(of, model_error_of(of)) for of in (fitted, replace(fitted, rival=rival))]
+    assert expected[1] > 1.2 * expected[0]
+
+
+# Heaters on no panel that is searched, nor as wide or as deep as one; the last but one is a room without any.
+@pytest.mark.parametrize(
+    ("panel", "views"),
+    [
+        (((1.27, 0.7), (1.75, 1.1)), ("y_max",)),
+        (((0.93, 0.9), (1.37, 1.4)), ("y_max",)),
+        (None, ("y_max",)),
+        (((1.07, 1.17), (1.47, 1.65)), ("y_max", "x_max")),
+    ],
+)
 def test_heat_that_nobody_stated_is_looked_for_where_walls_are_unknown_and_nothing_else_explains(
-    panel: tuple[tuple[float, float], tuple[float, float]] | None,
+    panel: tuple[tuple[float, float], tuple[float, float]] | None, views: tuple[WallName, ...]
 ):
     openings = scene(replace(SUPPLY, temperature_k=293.15, velocity_m_s=(0.1, 0.0, 0.0))).boundary[:2]
     heaters: tuple[Heater, ...] = ()
     if panel is not None:
         patch = Patch(wall="z_min", lower_m=panel[0], upper_m=panel[1])
         heaters = (Heater(patch=patch, temperature_k=343.15),)
-    there = replace(scene(SUPPLY), boundary=(*openings, *heaters))
+    seen = tuple(looking_at(wall) for wall in views)
+    there = replace(scene(SUPPLY), views=seen, boundary=(*openings, *heaters))
     entered = replace(there, boundary=openings)
     problem = measured(entered, true_room(there), 1e-5)
     problem = Problem(problem.scene, problem.shifts)
     reported: list[dict] = []
     found = solve_room(problem, SETTINGS, Watch(lambda row, growing: reported.append(row)))
 
-    asked_k = [event["suspected_k"] for event in reported if "suspected_k" in event]
     said = [note for note in found.notes if "heat that is not in the scene" in note]
-    assert len(asked_k) == len(said) == len(heaters)
+    # It is looked for along each axis that is told.
+    assert sum("suspected_k" in event for event in reported) == len(heaters) * len(views)
+    assert bool(said) == bool(heaters)
     if panel is not None:
-        # The strip that is named covers most of the panel's width.
-        low_m, high_m = (float(n) for n in re.findall(r"at x = ([\d.]+) to ([\d.]+) m", said[0])[0])
-        covered_m = min(high_m, panel[1][0]) - max(low_m, panel[0][0])
-        assert covered_m > 0.6 * (panel[1][0] - panel[0][0])
+        # The warmest panel that is named covers most of the heater along each axis that is told.
+        warmest = max(said, key=lambda note: float(re.findall(r"(\d+) K warmer", note)[0]))
+        spans = re.findall(r"([xy]) = ([\d.]+) to ([\d.]+) m", warmest)
+        assert [axis for axis, *_ in spans] == ["x", "y"][: len(views)]
+        for (_, low, high), lower_m, upper_m in zip(spans, *panel, strict=False):
+            assert min(float(high), upper_m) - max(float(low), lower_m) > 0.6 * (upper_m - lower_m)
 
 
 # Between the steps that are tried, and on another grid.
