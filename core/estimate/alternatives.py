@@ -33,7 +33,7 @@ def lacks_something(analysis: Analysis) -> bool:
 def suspected_heat(
     analysis: Analysis, background: Background, settings: RoomSettings, marches: Marches
 ) -> Suspect | None:
-    """The strip of floor whose heat may be missing; None where nothing is, or no strip would explain anything.
+    """The panel of floor whose heat may be missing; None where nothing is, or no panel would explain anything.
 
     It is looked for only where walls are unknown and the fitted room lacks something.
     """
