@@ -139,11 +139,11 @@ def missing_heat(problem: Problem, panel: SuspectedHeater, likeness: float) -> s
 
 
 def where_else(panel: SuspectedHeater, spans_m: Iterable[tuple[int, float, float]]) -> tuple[str, ...]:
-    """A sentence for each axis along which heat may as well stand elsewhere than on this panel."""
+    """A sentence for each axis along which heat may stand elsewhere than on this panel."""
     width_m = np.subtract(panel.patch.upper_m, panel.patch.lower_m)
     return tuple(
-        f"The images do not tell well where along {'xy'[axis]} this heat stands: anywhere from {low_m:.1f} to "
-        f"{high_m:.1f} m is as likely (95 %)."
+        f"The images do not tell well where along {'xy'[axis]} this heat stands: it may be anywhere from {low_m:.1f} "
+        f"to {high_m:.1f} m (95 %)."
         for axis, low_m, high_m in spans_m
         if high_m - low_m > _WIDE * width_m[axis]
     )

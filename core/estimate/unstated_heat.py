@@ -10,10 +10,10 @@ d that it makes may be scaled and all that the fit moves may move as well:
 R: variances of the data; J: derivatives in each fitted parameter, per prior deviation, as in the fit's first step. So
 warmer walls are told from a plume. Without J a panel would be liked for warming the air at all. A plume beside its
 true place, or too strong, would make the misfit itself larger. Each panel is made warmer as long as the correlation c
-rises; a times its heat is what the data ask for. With N data that err by themselves, a panel elsewhere is as likely
-(95 %) if N log((1 - c^2) / (1 - c_best^2)) is below 3.84, by the ratio of the likelihoods of what both leave: where
-heat may stand is said with that interval. The best panel enters the fit as a heater with a prior deviation of half
-its heat, and so do its neighbours along each axis that was told.
+rises; a times its heat is what the data ask for. With N data that err by themselves, the heat may stand at another
+panel (95 %) if N log((1 - c^2) / (1 - c_best^2)), twice the logarithm of the ratio of their likelihoods, is below 3.84;
+the result says so. The best panel enters the fit as a heater with a prior deviation of half its heat, and so do its
+neighbours along each axis that was told.
 """
 
 from collections.abc import Sequence
@@ -46,7 +46,6 @@ _PLACES, _SHARE = 9, 0.2
 _LADDER_K = (15.0, 30.0, 60.0, 120.0)
 # Prior deviation of the found heat, as a share of it.
 _STD_SHARE = 0.5
-
 # Where heat may stand is said with this probability.
 _SURE = 0.95
 
@@ -56,7 +55,7 @@ _DOING = "look for heat that nobody stated"
 class Suspect(NamedTuple):
     """A panel, the heat that the data ask of it, and how its change of the data correlates with what is left.
 
-    `spans_m` is from where to where, along each axis that was searched, panels are as likely at 95 %.
+    `spans_m` is from where to where, along each axis that was searched, heat may stand (95 %).
     """
 
     likeness: float
@@ -114,7 +113,7 @@ def likeliest(
         if best is None or best.likeness <= 0.0:
             return None
         middle_m = best.panel.patch.centre_m
-        spans_m = (*spans_m, (axis, *as_likely_m(suspects, axis, independent(data))))
+        spans_m = (*spans_m, (axis, *where_m(suspects, axis, independent(data))))
         best = best._replace(spans_m=spans_m)
         marches.record({"doing": _DOING, "suspected_k": best.heat_k, "likeness": best.likeness})
     return best
@@ -125,8 +124,8 @@ def independent(data: Observations) -> float:
     return float(np.sum(1.0 / data.alike()[data.values()[2] == IMAGES]))
 
 
-def as_likely_m(suspects: Sequence[Suspect], axis: int, count: float) -> tuple[float, float]:
-    """From where to where along an axis panels lie that are as likely as the best, at 95 %, by `count` data."""
+def where_m(suspects: Sequence[Suspect], axis: int, count: float) -> tuple[float, float]:
+    """From where to where along an axis heat may stand (95 %), by `count` data that err by themselves."""
     left = np.array([1.0 - suspect.likeness**2 for suspect in suspects])
     likely = count * np.log(left / left.min()) < float(ndtri(0.5 + 0.5 * _SURE)) ** 2
     patches = [suspect.panel.patch for suspect, kept in zip(suspects, likely, strict=True) if kept]
