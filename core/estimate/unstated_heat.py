@@ -11,8 +11,8 @@ R: variances of the data; J: derivatives in each fitted parameter, per prior dev
 warmer walls are told from a plume. Without J a panel would be liked for warming the air at all. A plume beside its
 true place, or too strong, would make the misfit itself larger. Each panel is made warmer as long as the correlation c
 rises; a times its heat is what the data ask for. With N data that err by themselves, the heat may stand at another
-panel (95 %) if N log((1 - c^2) / (1 - c_best^2)), twice the logarithm of the ratio of their likelihoods, is below 3.84;
-the result says so. The best panel enters the fit as a heater with a prior deviation of half its heat, and so do its
+panel (95 %) if N log((1 - c^2) / (1 - c_best^2)), twice the logarithm of their likelihoods' ratio, is below 3.84; the
+result says so. The best panel enters the fit as a heater with a prior deviation of half its heat, and so do its
 neighbours along each axis that was told.
 """
 
