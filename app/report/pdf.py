@@ -57,10 +57,30 @@ _NOTES, _ADVICE, _LONGEST = 9, 5, 400
 
 _METHOD = (
     "A camera looks through the air at a patterned wall. Warm air bends light a little less than cold air, so the "
-    "pattern moves by hundredths of a pixel between a picture with still air and one with the air moving. A small "
-    "flow solver marches the room to a steady state; the measured shifts correct the numbers that nobody knows "
-    "exactly. Each figure's interval comes from samples of what the measurements leave open."
+    "pattern moves by hundredths of a pixel between a picture with still air and one with the air moving. {how} "
+    "Each figure's interval comes from samples of what the measurements leave open."
 )
+_MARCHED = (
+    "A small flow solver marches the room to a steady state; the measured shifts correct the numbers that nobody "
+    "knows exactly."
+)
+_FITTED = (
+    "Temperature, pressure and velocity are fitted to the measured shifts and to the equations of moving air."
+)
+# How each preset comes from shifts to the air.
+_HOW = {
+    "draft": "Temperature is fitted to the measured shifts: over the height, and what departs from that. No flow is "
+    "computed.",
+    "grid": _FITTED,
+    "paper": _FITTED,
+    "standard": _MARCHED,
+    "reference": _MARCHED,
+}
+
+
+def method(preset: str) -> str:
+    """How a preset measures the air, in words for a reader of the report; of an unknown one what all share."""
+    return _METHOD.format(how=_HOW.get(preset, ""))
 
 
 def report_pdf(folder: Path, result: Path, path: Path) -> None:
@@ -143,7 +163,7 @@ def _second(finding: Finding) -> Iterable[Flowable]:
         ("against the truth", "error", "trivial answers"), lambda: score_rows(finding), (0.4, 0.12, 0.48)
     )
     yield _text("Method and rig", _HEAD)
-    yield _text(_METHOD, _TEXT)
+    yield _text(method(str(finding.manifest.get("preset"))), _TEXT)
     known = "; ".join(f"{name}: {words}" for name, words in facts(finding.experiment))
     yield _text(_short(known, 3 * _LONGEST, "; "), _SMALL)
     yield _text("What was assumed, and limits", _HEAD)

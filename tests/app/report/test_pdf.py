@@ -7,10 +7,11 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import create_cli
+from app.reconstruct.presets import PRESETS
 from app.report.answer import advice, summary, tiles
 from app.report.finding import read_finding
 from app.report.indoor import told
-from app.report.pdf import _short, write_pdf
+from app.report.pdf import _short, method, write_pdf
 from core.estimate.diagnostics import doubtful, other_way
 from tests.app.report.test_indoor import experiment  # noqa: F401
 
@@ -70,6 +71,13 @@ def test_what_is_seen_at_a_glance_is_what_the_table_tells(finding):
 
 def test_a_room_without_thermometers_is_told_to_hang_them(finding):
     assert any("thermometers" in sentence for sentence in advice(finding))
+
+
+def test_the_method_is_that_of_the_preset():
+    assert "No flow is computed." in method("draft")
+    assert "flow solver" not in method("draft")
+    for name in PRESETS:
+        assert len(method(name)) > len(method("unknown")), name
 
 
 def test_the_pdf_has_two_pages_with_pictures(finding, tmp_path):
