@@ -4,20 +4,24 @@ Each alternative costs a whole fit. It is tried only where the fitted room leave
 a heat source, more than half, or than models of the air differ in (`core.estimate.model_error`).
 """
 
+import numpy as np
+from scipy.stats import chi2
+
 from core.estimate.diagnostics import missing
 from core.estimate.explained import explained
 from core.estimate.forward_runs import RoomSettings, other_closure
 from core.estimate.marches import Marches
 from core.estimate.parameter_fit import Background
 from core.estimate.posterior import Analysis, model_error_of
-from core.estimate.unstated_heat import Suspect, likeliest
+from core.estimate.unstated_heat import Suspect, independent, likeliest
 from core.room.forward import LARGE_EDDIES, Room
+from core.view_frame import told_on_floor
 
 # Share of the measured shifts (rms) that a fitted room leaves unexplained. At 48 cells rooms with the right closure
 # leave 8 to 22 %, rooms with a wrong one 29 to 40 %.
 _TRY_CLOSURE = 0.25
-# The room with the added heater is kept if it leaves at most this share of what the room without it leaves.
-KEEP_HEAT = 0.8
+# Of rooms that lack no heat, one in twenty is taken with it.
+_FALSE_ALARMS = 0.05
 
 
 def left_over(analysis: Analysis) -> float:
@@ -40,6 +44,17 @@ def suspected_heat(
     if not settings.use_images or not background.prior.unknown_walls() or not lacks_something(analysis):
         return None
     return likeliest(background, analysis.data, settings, marches)
+
+
+def is_warmer(warm: Analysis, without: Analysis) -> bool:
+    """Whether the room with suspected heat explains more of the images than its panels would by chance.
+
+    Twice the logarithm of the likelihoods' ratio, of the images' data that err by themselves, has a chi-square
+    distribution (Wilks 1938). Its degrees of freedom are the heat of the panel and of its neighbours.
+    """
+    gained = 2.0 * independent(without.data) * np.log(left_over(without) / left_over(warm))
+    panels = 1 + 2 * len(told_on_floor(without.problem.scene))
+    return bool(gained > chi2.ppf(1.0 - _FALSE_ALARMS, panels))
 
 
 def worth_large_eddies(analysis: Analysis, settings: RoomSettings) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
-from core.estimate.alternatives import promising_closure, worth_large_eddies
+from core.estimate.alternatives import is_warmer, promising_closure, worth_large_eddies
 from core.estimate.forward_runs import Derivatives, march_under, perturbed
 from core.estimate.heaters import heaters_by_march
 from core.estimate.levenberg_marquardt import fine_search
@@ -355,6 +355,20 @@ def test_the_velocity_may_be_wrong_by_what_a_room_that_explains_as_much_has_ther
     np.testing.assert_allclose(beside.velocity_std_m_s[far], alone.velocity_std_m_s[far], rtol=0.3)
     expected = [doubt_of_velocity(of, model_error_of(of)) for of in (fitted, replace(fitted, rival=rival))]
     assert expected[1] > 1.2 * expected[0]
+
+
+@pytest.mark.parametrize(("left", "better"), [(0.95, False), (0.7, True)])
+def test_a_room_with_more_heat_must_explain_more_than_chance_would(
+    truth: Solution, under_k_epsilon: tuple[Analysis, Room], left: float, better: bool
+):
+    # As if the room explained half of the truth, and the warmer one all but `left` of what that leaves.
+    true_k = np.asarray(truth.temperature_k - 293.15)
+    without, warm = (
+        eqx.tree_at(lambda s: s.best.fields.excess_k, under_k_epsilon[0], share * true_k)
+        for share in (0.5, 1.0 - 0.5 * left)
+    )
+    assert is_warmer(warm, without) == better
+    assert not is_warmer(without, warm)
 
 
 # Heaters on no panel that is searched, nor as wide or as deep as one; the last but one is a room without any.
