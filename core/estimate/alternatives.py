@@ -20,7 +20,7 @@ from core.view_frame import told_on_floor
 # Share of the measured shifts (rms) that a fitted room leaves unexplained. At 48 cells rooms with the right closure
 # leave 8 to 22 %, rooms with a wrong one 29 to 40 %.
 _TRY_CLOSURE = 0.25
-# Of rooms that lack no heat, one in twenty is taken with it.
+# Of rooms that lack no heat and are fitted with some, one in twenty is taken with it.
 _FALSE_ALARMS = 0.05
 
 
@@ -46,7 +46,7 @@ def suspected_heat(
     return likeliest(background, analysis.data, settings, marches)
 
 
-def is_warmer(warm: Analysis, without: Analysis) -> bool:
+def explains_more(warm: Analysis, without: Analysis) -> bool:
     """Whether the room with suspected heat explains more of the images than its panels would by chance.
 
     Twice the logarithm of the likelihoods' ratio, of the images' data that err by themselves, has a chi-square

@@ -113,7 +113,7 @@ def likeliest(
         if best is None or best.likeness <= 0.0:
             return None
         middle_m = best.panel.patch.centre_m
-        spans_m = (*spans_m, (axis, *where_m(suspects, axis, independent(data))))
+        spans_m = (*spans_m, (axis, *likely_span_m(suspects, axis, independent(data))))
         best = best._replace(spans_m=spans_m)
         marches.record({"doing": _DOING, "suspected_k": best.heat_k, "likeness": best.likeness})
     return best
@@ -124,7 +124,7 @@ def independent(data: Observations) -> float:
     return float(np.sum(1.0 / data.alike()[data.values()[2] == IMAGES]))
 
 
-def where_m(suspects: Sequence[Suspect], axis: int, count: float) -> tuple[float, float]:
+def likely_span_m(suspects: Sequence[Suspect], axis: int, count: float) -> tuple[float, float]:
     """From where to where along an axis heat may stand (95 %), by `count` data that err by themselves."""
     left = np.array([1.0 - suspect.likeness**2 for suspect in suspects])
     likely = count * np.log(left / left.min()) < float(ndtri(0.5 + 0.5 * _SURE)) ** 2

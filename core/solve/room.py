@@ -13,7 +13,7 @@ import numpy as np
 
 from core.checkpoint import digest
 from core.estimate.alternatives import (
-    is_warmer,
+    explains_more,
     lacks_something,
     left_over,
     promising_closure,
@@ -116,7 +116,7 @@ def analyse(background: Background, problem: Problem, settings: RoomSettings, ma
         warm = with_suspected_heat(background.problem, suspect)
         name = background.coarse.closure
         again = fitted_room(background_of(warm, settings, marches, name), problem, settings, marches)
-        if is_warmer(again, analysis):
+        if explains_more(again, analysis):
             of_closure, of_heat = (), where_else(suspect.panel, suspect.spans_m)
             analysis, closure, suspect = again, name, None
         else:

@@ -13,8 +13,8 @@ from core.estimate.temperature_levels import free_vertices
 from core.estimate.unstated_heat import (
     Residual,
     Suspect,
+    likely_span_m,
     panels_along,
-    where_m,
     with_heaters,
     with_suspected_heat,
 )
@@ -128,7 +128,7 @@ def test_where_heat_may_stand_is_said_only_if_the_images_do_not_tell_it():
     likeness = [0.1, 0.2, 0.3, 0.5, 0.8, 0.5, 0.3, 0.78, 0.2]
     suspects = [Suspect(c, 20.0, panel) for c, panel in zip(likeness, panels, strict=True)]
 
-    few, many = (where_m(suspects, 0, count) for count in (20.0, 2000.0))
+    few, many = (likely_span_m(suspects, 0, count) for count in (20.0, 2000.0))
 
     # The other likely panel lies from 1.4 to 1.8 m; many data tell it from the best one.
     assert few == pytest.approx((0.8, 1.8))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
-from core.estimate.alternatives import is_warmer, promising_closure, worth_large_eddies
+from core.estimate.alternatives import explains_more, promising_closure, worth_large_eddies
 from core.estimate.forward_runs import Derivatives, march_under, perturbed
 from core.estimate.heaters import heaters_by_march
 from core.estimate.levenberg_marquardt import fine_search
@@ -367,8 +367,8 @@ def test_a_room_with_more_heat_must_explain_more_than_chance_would(
         eqx.tree_at(lambda s: s.best.fields.excess_k, under_k_epsilon[0], share * true_k)
         for share in (0.5, 1.0 - 0.5 * left)
     )
-    assert is_warmer(warm, without) == better
-    assert not is_warmer(without, warm)
+    assert explains_more(warm, without) == better
+    assert not explains_more(without, warm)
 
 
 # Heaters on no panel that is searched, nor as wide or as deep as one; the last but one is a room without any.
