@@ -14,6 +14,7 @@ from app.report.indoor import told as line_of
 from app.report.meaning import MIXED, beside, category, meaning, warmth
 from core.result import Outcome
 from core.scene import PointSensors, Wall
+from core.significance import EITHER_WAY
 
 # A camera of fewer pixels, or a mean of fewer frames, sees less than a usual one.
 _PIXELS, _FRAMES = 2000, 100
@@ -122,10 +123,10 @@ def _sure(finding: Finding) -> str:
     solution = finding.solution
     parts = []
     if solution.temperature_std_k is not None:
-        parts.append(f"temperature to ± {1.96 * float(np.median(solution.temperature_std_k)):.2f} K")
+        parts.append(f"temperature to ± {EITHER_WAY * float(np.median(solution.temperature_std_k)):.2f} K")
     if solution.velocity_std_m_s is not None:
         spread = np.linalg.norm(np.asarray(solution.velocity_std_m_s), axis=-1)
-        parts.append(f"velocity to ± {1.96 * float(np.median(spread)):.2f} m/s")
+        parts.append(f"velocity to ± {EITHER_WAY * float(np.median(spread)):.2f} m/s")
     sure = (
         f"At a usual place these are known: {' and '.join(parts)} (95 %)."
         if parts

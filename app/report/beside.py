@@ -12,9 +12,8 @@ from core.geometry import Vector3, face_of
 from core.occupied import ANKLE_M, HEAD_M
 from core.result import Solution
 from core.scene import Inlet, Scene
+from core.significance import EITHER_WAY
 
-# Within so many deviations lie 95 % of a normal error.
-SIGMAS = 1.96
 # How far before a supply its jet is looked at, at most, and as a share of the room.
 _BEFORE_M, _BEFORE_SHARE = 1.0, 0.3
 
@@ -49,10 +48,10 @@ def places(solution: Solution, scene: Scene, truth: RoomVolume | None = None) ->
                 words,
                 at_m,
                 _celsius(celsius),
-                None if half_k is None else SIGMAS * half_k,
+                None if half_k is None else EITHER_WAY * half_k,
                 _celsius(true),
                 fast,
-                None if half_m_s is None else SIGMAS * half_m_s,
+                None if half_m_s is None else EITHER_WAY * half_m_s,
                 true_fast,
             )
         )

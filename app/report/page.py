@@ -17,7 +17,7 @@ from app.experiment.folder import Experiment, open_experiment
 from app.experiment.found import found_in
 from app.files.durable import write_text
 from app.report.answer import AtAGlance, advice, assumed, summary, tiles
-from app.report.beside import SIGMAS, places, rows
+from app.report.beside import places, rows
 from app.report.figures import (
     as_data_uri,
     error_figure,
@@ -40,6 +40,7 @@ from core.drift import nearly_still
 from core.occupied import HEAD_M
 from core.result import Solution
 from core.setting import SettingError
+from core.significance import EITHER_WAY
 
 Rows = Iterable[tuple[str, ...]]
 
@@ -251,10 +252,10 @@ def _planes(finding: Finding) -> Iterable[Picture]:
 def _known(solution: Solution) -> Iterable[Picture]:
     """How sure the solver is, and where the measurements rather than the model speak."""
     if solution.temperature_std_k is not None:
-        figure = volume_figure(solution, SIGMAS * solution.temperature_std_k, "± K (95 %)")
+        figure = volume_figure(solution, EITHER_WAY * solution.temperature_std_k, "± K (95 %)")
         yield Picture(as_data_uri(figure), "Temperature: half of its 95 % interval.")
     if solution.velocity_std_m_s is not None:
-        size = SIGMAS * np.linalg.norm(solution.velocity_std_m_s, axis=-1)
+        size = EITHER_WAY * np.linalg.norm(solution.velocity_std_m_s, axis=-1)
         figure = volume_figure(solution, size, "± m/s (95 %)")
         yield Picture(as_data_uri(figure), "Velocity: half of its 95 % interval.")
     if solution.informed is not None:

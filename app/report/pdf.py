@@ -27,7 +27,7 @@ from reportlab.platypus import (
 from app.errors import explained
 from app.experiment.folder import open_experiment
 from app.report.answer import AtAGlance, advice, assumed, summary, tiles
-from app.report.beside import SIGMAS, places, rows
+from app.report.beside import places, rows
 from app.report.figures import as_png, slices_figure, volume_figure
 from app.report.finding import Finding, read_finding
 from app.report.indoor import told
@@ -36,6 +36,7 @@ from app.report.meaning import meaning
 from app.report.room_figure import room_figure
 from app.report.tables import facts, score_rows
 from core.setting import SettingError
+from core.significance import EITHER_WAY
 
 # A frame has 6 points of padding on each side.
 _WIDTH = A4[0] - 30 * mm - 12
@@ -155,9 +156,9 @@ def _second(finding: Finding) -> Iterable[Flowable]:
     yield _text("How sure it is: half of the 95 % interval of temperature, and of velocity", _HEAD)
     deviation, spread = solution.temperature_std_k, solution.velocity_std_m_s
     if deviation is not None:
-        yield from _picture(lambda: volume_figure(solution, SIGMAS * deviation, "± K (95 %)"), 0.68)
+        yield from _picture(lambda: volume_figure(solution, EITHER_WAY * deviation, "± K (95 %)"), 0.68)
     if spread is not None:
-        size = SIGMAS * np.linalg.norm(spread, axis=-1)
+        size = EITHER_WAY * np.linalg.norm(spread, axis=-1)
         yield from _picture(lambda: volume_figure(solution, size, "± m/s (95 %)"), 0.68)
     yield from _table(
         ("against the truth", "error", "trivial answers"), lambda: score_rows(finding), (0.4, 0.12, 0.48)

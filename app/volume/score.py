@@ -13,9 +13,7 @@ from app.volume.file import RoomVolume, filled, read_volume
 from app.volume.score_bursts import score_bursts
 from core.metrics import inner, mean_of_air, score_pressure, score_temperature, score_velocity
 from core.result import Solution
-
-# A 95 % interval.
-_SIGMAS = 1.96
+from core.significance import EITHER_WAY
 
 
 def score_experiment(folder: Path, truth_path: Path, result: Path | None = None) -> dict[str, Any]:
@@ -69,7 +67,7 @@ def coverage(solution: Solution, truth: RoomVolume) -> dict[str, float | None]:
             return None
         error = inner(values_at(truth, solution, found)) - inner(in_air(truth, values))
         error = error if level else error - mean_of_air(error)
-        held = np.abs(error) <= _SIGMAS * inner(values_at(truth, solution, std))
+        held = np.abs(error) <= EITHER_WAY * inner(values_at(truth, solution, std))
         return float(np.mean(held[~np.isnan(error)]))
 
     s = solution

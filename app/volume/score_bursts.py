@@ -12,9 +12,7 @@ from app.volume.snapshots import Snapshots, read_snapshots
 from core.geometry import Box
 from core.metrics import inner
 from core.result import Solution
-
-# A 95 % interval.
-_SIGMAS = 1.96
+from core.significance import EITHER_WAY
 
 
 def score_bursts(experiment: Experiment, bursts: list[str], solution: Solution) -> dict[str, Any] | None:
@@ -38,7 +36,7 @@ def score_bursts(experiment: Experiment, bursts: list[str], solution: Solution) 
     error_k = inner(np.moveaxis(mean_k + departures_k - true_k, 0, -1))
     moved_k = inner(np.moveaxis(true_k - true_k.mean(axis=0), 0, -1))
     missed_k = inner(np.moveaxis(departures_k, 0, -1)) - moved_k
-    held = np.abs(error_k) <= _SIGMAS * inner(np.hypot(std_k, own_std_k))[..., None]
+    held = np.abs(error_k) <= EITHER_WAY * inner(np.hypot(std_k, own_std_k))[..., None]
     return {
         "rms_K": _rms(error_k),
         "mean_rms_K": _rms(inner(np.moveaxis(mean_k - true_k, 0, -1))),

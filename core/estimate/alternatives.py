@@ -15,13 +15,12 @@ from core.estimate.parameter_fit import Background
 from core.estimate.posterior import Analysis, model_error_of
 from core.estimate.unstated_heat import Suspect, independent, likeliest
 from core.room.forward import LARGE_EDDIES, Room
+from core.significance import FALSE_ALARMS
 from core.view_frame import told_on_floor
 
 # Share of the measured shifts (rms) that a fitted room leaves unexplained. At 48 cells rooms with the right closure
 # leave 8 to 22 %, rooms with a wrong one 29 to 40 %.
 _TRY_CLOSURE = 0.25
-# Of rooms that lack no heat and are fitted with some, one in twenty is taken with it.
-_FALSE_ALARMS = 0.05
 
 
 def left_over(analysis: Analysis) -> float:
@@ -47,14 +46,14 @@ def suspected_heat(
 
 
 def explains_more(warm: Analysis, without: Analysis) -> bool:
-    """Whether the room with suspected heat explains more of the images than its panels would by chance.
+    """Whether the room with suspected heat explains more of the images than its panels do by chance, once in twenty.
 
     Twice the logarithm of the likelihoods' ratio, of the images' data that err by themselves, has a chi-square
     distribution (Wilks 1938). Its degrees of freedom are the heat of the panel and of its neighbours.
     """
     gained = 2.0 * independent(without.data) * np.log(left_over(without) / left_over(warm))
     panels = 1 + 2 * len(told_on_floor(without.problem.scene))
-    return bool(gained > chi2.ppf(1.0 - _FALSE_ALARMS, panels))
+    return bool(gained > chi2.ppf(1.0 - FALSE_ALARMS, panels))
 
 
 def worth_large_eddies(analysis: Analysis, settings: RoomSettings) -> bool:

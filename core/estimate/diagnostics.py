@@ -15,11 +15,9 @@ from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.scene import Driving, Heater, Inlet
+from core.significance import EITHER_WAY, FALSE_ALARMS
 from core.view_frame import told_on_floor
 
-# One room in twenty has an entry called wrong that is as right as its stated deviation says.
-_FALSE_ALARMS = 0.05
-_INTERVAL = 1.96
 # Missing heat is reported above this share of the heat that the supplies bring.
 _MISSING_SHARE = 0.1
 # The velocity is called doubtful if more than this share of it (rms) is expected to be wrong.
@@ -47,7 +45,7 @@ def contradictions(
     """
     fitted = prior.parameters(posterior.vector)
     doubt = np.sqrt(1.0 + by_model**2)
-    limit = float(ndtri(1.0 - _FALSE_ALARMS / (2.0 * max(len(doubt), 1))))
+    limit = float(ndtri(1.0 - FALSE_ALARMS / (2.0 * max(len(doubt), 1))))
     times = dict(zip(prior.names(), np.abs(posterior.vector) / doubt, strict=True))
     believed = {name: n for name, n in times.items() if n > limit and doubt_of_velocity <= _DOUBTFUL}
     inlets = [b for b in problem.scene.boundary if isinstance(b, Inlet)]
@@ -103,7 +101,7 @@ def objects_heat(
         name = f"object_power_w[{n}]"
         if name not in own:
             continue
-        watts, spread = float(fitted.object_power_w[n]), _INTERVAL * item.power_std_w * float(own[name])
+        watts, spread = float(fitted.object_power_w[n]), EITHER_WAY * item.power_std_w * float(own[name])
         text = (
             f"The object {item.name!r} gives {watts:.0f} W to the air (95 %: {watts - spread:.0f} to "
             f"{watts + spread:.0f} W; entered: {item.power_w:.0f} W)."

@@ -2,17 +2,15 @@
 
 import equinox as eqx
 import numpy as np
-from scipy.special import ndtri
 
 from core.data_error import CORRELATED_DATA
 from core.estimate.image_noise import images
 from core.estimate.observation import Observations
 from core.room.vertices import RoomFields
+from core.significance import TO_ONE_SIDE
 
 # Share left that is assumed where the images do not tell it: there are none, or all that they show may be noise.
 _UNSEEN_SHARE = 0.3
-# Of pictures that show nothing but noise beside what a room explains, one in twenty is said to show more.
-_FALSE_ALARMS = 0.05
 # A room that leaves more than this share lacks something.
 _HALF = 0.5
 
@@ -35,7 +33,7 @@ class Explained(eqx.Module):
     def stands_out(self) -> bool:
         """Whether what is left is more than the noise may be misjudged by, in 19 pictures of 20."""
         beyond = self.left_px**2 / self.noise_px**2
-        return beyond > float(ndtri(1.0 - _FALSE_ALARMS)) * self.noise_known
+        return beyond > TO_ONE_SIDE * self.noise_known
 
     @property
     def half_left(self) -> bool:
@@ -87,7 +85,7 @@ def likeness(data: Observations, fields: RoomFields) -> float:
     seen = images(data, fields)
     product = float(seen.values_px @ seen.predicted_px)
     by_noise = float(np.sqrt(CORRELATED_DATA * np.sum(seen.variance_px2 * seen.predicted_px**2)))
-    if abs(product) <= float(ndtri(1.0 - _FALSE_ALARMS)) * by_noise:
+    if abs(product) <= TO_ONE_SIDE * by_noise:
         return 0.0
     signal = explained(data, fields).measured_px * np.sqrt(len(seen.values_px))
     return float(np.clip(product / (signal * np.linalg.norm(seen.predicted_px)), -1.0, 1.0))

@@ -25,7 +25,6 @@ import numpy as np
 from jaxtyping import Float
 from scipy import ndimage
 from scipy.optimize import minimize_scalar
-from scipy.special import ndtri
 
 from core.data_error import LENGTH_SHARE
 from core.estimate.forward_runs import Derivatives
@@ -33,6 +32,7 @@ from core.estimate.image_noise import images, unshared
 from core.estimate.least_squares import Posterior
 from core.estimate.observation import IMAGES, Observations
 from core.room.vertices import RoomFields
+from core.significance import TO_ONE_SIDE
 
 Pair = tuple[RoomFields, RoomFields]
 
@@ -41,8 +41,6 @@ _STUDENT = 3.0
 _EACH = 0.5
 # Of the logarithm of k: within e^4 either way.
 _FARTHEST = 4.0
-# One room in twenty that lacks nothing is said to lack something.
-_FALSE_ALARMS = 0.05
 
 
 class ModelError(eqx.Module):
@@ -60,7 +58,7 @@ class ModelError(eqx.Module):
     @property
     def lacks(self) -> bool:
         """Whether the room lacks something: it leaves more of the images than k may be, in 19 rooms of 20."""
-        return self.left_ratio > float(np.exp(ndtri(1.0 - _FALSE_ALARMS)))
+        return self.left_ratio > float(np.exp(TO_ONE_SIDE))
 
     @property
     def moves(self) -> Float[np.ndarray, " active"]:

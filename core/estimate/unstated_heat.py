@@ -24,7 +24,6 @@ from typing import NamedTuple
 import equinox as eqx
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtri
 
 from core.estimate.forward_runs import RoomSettings, march_under
 from core.estimate.marches import Marches
@@ -37,6 +36,7 @@ from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.room.forward import Room, room
 from core.scene import Heater, OnPatch, Patch
+from core.significance import EITHER_WAY
 from core.view_frame import told_on_floor
 
 # Panels along an axis, each overlapping the next by half: five of them cover the floor's length.
@@ -46,8 +46,6 @@ _PLACES, _SHARE = 9, 0.2
 _LADDER_K = (15.0, 30.0, 60.0, 120.0)
 # Prior deviation of the found heat, as a share of it.
 _STD_SHARE = 0.5
-# Where heat may stand is said with this probability.
-_SURE = 0.95
 
 _DOING = "look for heat that nobody stated"
 
@@ -127,7 +125,7 @@ def independent(data: Observations) -> float:
 def likely_span_m(suspects: Sequence[Suspect], axis: int, count: float) -> tuple[float, float]:
     """From where to where along an axis heat may stand (95 %), by `count` data that err by themselves."""
     left = np.array([1.0 - suspect.likeness**2 for suspect in suspects])
-    likely = count * np.log(left / left.min()) < float(ndtri(0.5 + 0.5 * _SURE)) ** 2
+    likely = count * np.log(left / left.min()) < EITHER_WAY**2
     patches = [suspect.panel.patch for suspect, kept in zip(suspects, likely, strict=True) if kept]
     return min(p.lower_m[axis] for p in patches), max(p.upper_m[axis] for p in patches)
 

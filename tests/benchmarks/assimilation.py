@@ -56,11 +56,11 @@ from core.room.room_grid import AXES, Velocity
 from core.room.step import Flow, RoomModel
 from core.room.wall_planes import set_normal
 from core.scene import Scene
+from core.significance import EITHER_WAY
 from core.solve.sequence.departures import joined, solve_departures
 
 # Vertices on which departures are seen and scored, and points across the wall at which the filter is worked out.
 VERTICES, POINTS = (33, 33, 33), (13, 9)
-SIGMAS = 1.96
 # A jet answers within this time (core.estimate.forward_runs).
 RESPONSE_S = 30.0
 # A Gaussian weight below this counts nothing.
@@ -265,7 +265,7 @@ def scored(found: Air, mean: Air, truth: Air, begin: str = "") -> dict[str, floa
         row |= {
             f"{begin}{letter}_{unit}": rms(error),
             f"{begin}{letter}_departure": rms(flat(own - true_moved)) / rms(flat(true_moved)),
-            f"{begin}{letter}_within": float(np.mean(np.abs(error) <= SIGMAS * sigma)),
+            f"{begin}{letter}_within": float(np.mean(np.abs(error) <= EITHER_WAY * sigma)),
         }
     return row
 

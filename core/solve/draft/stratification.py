@@ -4,14 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from core.significance import TO_ONE_SIDE
 from core.solve.draft.temperature_system import System, Volume
-
-# Of air that is equally warm at all heights one room in twenty is said to lie the wrong way up; one-sided.
-_SURE = 1.645
 
 
 def upside_down(temperature_k: Volume, system: System, solve: Callable[[Volume], Volume]) -> list[str]:
-    """A sentence if the temperature falls with height by more than its deviation allows.
+    """A sentence if the temperature falls with height by more than its deviation allows, in 19 rooms of 20.
 
     `solve` inverts the Hessian of `system`, in which the deviation is counted.
     """
@@ -20,7 +18,7 @@ def upside_down(temperature_k: Volume, system: System, solve: Callable[[Volume],
     if rise_k >= 0.0:
         return []
     std_k = float(np.sqrt(np.sum(slope * solve(slope)))) / system.per_k
-    if rise_k > -_SURE * std_k:
+    if rise_k > -TO_ONE_SIDE * std_k:
         return []
     return [
         f"The air found is warmer below than above: it falls by {-rise_k:.2f} K from floor to ceiling "

@@ -1,0 +1,8 @@
+"""How sure a statement must be: each test gives one false alarm in twenty, and intervals hold 95 %."""
+
+from scipy.special import ndtri
+
+FALSE_ALARMS = 0.05
+# Standard deviations that a normal quantity leaves, in so many cases, to one side only, and to either side.
+TO_ONE_SIDE = float(ndtri(1.0 - FALSE_ALARMS))
+EITHER_WAY = float(ndtri(1.0 - 0.5 * FALSE_ALARMS))
