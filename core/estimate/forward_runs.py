@@ -44,12 +44,10 @@ class RoomSettings:
     Times are those of the reference room, as its cells live them in the mean (`core.room.march`); slower rooms march
     longer (`Room.turnover_ratio`).
 
-    `coarse_step`, `least_gain`: rounds on the coarse grid end when no parameter moves by more than `coarse_step`,
-    or when a round leaves more than `least_gain` of the misfit.
-    `jacobian_valid`: a Jacobian is computed anew once a parameter has moved this far from where it was computed.
+    `jacobian_valid`, `renewals`: a Jacobian is computed anew once a parameter has moved this far from where it was
+    computed, and so often at most.
     `restart_walls_s`: as `restart_s`, where walls are unknown: jets answer slowly to a wall.
-    `jacobian_valid_walls`, `renewals`: the same for the fine room where walls are unknown, and how often at most.
-    `fine_step`: rounds on the fine grid end when no parameter moves by more.
+    `fine_step`: rounds end when no parameter moves by more.
     `wall_heat`: multiplies the walls' heat coefficient from the heat balance, or the nominal one.
     `log_viscosity_std`: prior deviation of the eddy viscosity's logarithm over the room; None takes the
     closure's (`core.estimate.prior`).
@@ -59,11 +57,7 @@ class RoomSettings:
     coarse_cells: int = 32
     vertices: int = 64
     rounds: int = 8
-    coarse_rounds: int = 6
-    coarse_step: float = 1.0
-    least_gain: float = 0.85
-    jacobian_valid: float = 4.0
-    jacobian_valid_walls: float = 1.5
+    jacobian_valid: float = 1.5
     renewals: int = 2
     fine_step: float = 0.3
     settle_s: float = 240.0

@@ -38,7 +38,6 @@ def gauss_newton(
     jacobian: Float[np.ndarray, "data active"],
     gaussian: Bool[np.ndarray, " active"],
     *,
-    all_gaussian: bool = False,
     trust_radius: float | None = None,
 ) -> Posterior:
     """One step from `vector`, where `residual` is the data minus the prediction.
@@ -47,13 +46,12 @@ def gauss_newton(
     With it the whole step is damped until no parameter moves by more: where parameters compensate one another,
     limiting them one by one would spoil that.
 
-    `gaussian` marks parameters with a Gaussian prior. `all_gaussian` gives all of them one: for the first steps,
-    while the model is still far from the data.
+    `gaussian` marks parameters with a Gaussian prior.
     """
     new, normal, prior = vector, np.eye(len(vector)), np.ones(len(vector))
     for _ in range(6):
         student = (_STUDENT_NU + 1.0) / (_STUDENT_NU + new**2)
-        prior = np.where(gaussian | all_gaussian, 1.0, student)
+        prior = np.where(gaussian, 1.0, student)
         normal = (jacobian.T / variance) @ jacobian + np.diag(prior)
         gradient = (jacobian.T / variance) @ residual - prior * vector
         if trust_radius is None:

@@ -19,23 +19,21 @@ def corrected(
     grid_difference: Float[np.ndarray, " data"],
     *,
     gaussian: Bool[np.ndarray, " active"],
-    offset: Float[np.ndarray, " data"] | float = 0.0,
-    all_gaussian: bool = False,
+    far: bool = False,
     trust_radius: float | None = None,
 ) -> Posterior:
-    """One Gauss-Newton step from `vector`, by the residual of the run `best`; `offset` is added to its prediction.
+    """One Gauss-Newton step from `vector`, by the residual of the run `best`.
 
-    With a `trust_radius` the room counts as far from the truth (`weighted_variance`).
+    `far`: how the data count where the room may be far from the truth (`weighted_variance`).
     """
-    residual = data.values()[0] - data.predicted(best.fields) - offset
-    weights = variance_of(data, residual, grid_difference, far=trust_radius is not None)
+    residual = data.values()[0] - data.predicted(best.fields)
+    weights = variance_of(data, residual, grid_difference, far=far)
     return gauss_newton(
         vector,
         data.unshared(residual, weights),
         weights,
         data.unshared(jacobian, weights),
         gaussian,
-        all_gaussian=all_gaussian,
         trust_radius=trust_radius,
     )
 
@@ -53,11 +51,9 @@ def variance_of(
     return weighted_variance(noise, data.alike(), group, residual, grid_difference, far=far)
 
 
-def misfit_ratio(
-    data: Observations, new: ForwardRun, old: ForwardRun, offset: Float[np.ndarray, " data"] | float = 0.0
-) -> float:
+def misfit_ratio(data: Observations, new: ForwardRun, old: ForwardRun) -> float:
     """Misfit of a run over that of another, each datum weighted by its noise and the old run's residual."""
-    after, before = (data.values()[0] - data.predicted(a.fields) - offset for a in (new, old))
+    after, before = (data.values()[0] - data.predicted(a.fields) for a in (new, old))
     weights = variance_of(data, before, before)
     after, before = (data.unshared(of, weights) for of in (after, before))
     return float(np.sqrt(np.sum(after**2 / weights) / max(np.sum(before**2 / weights), 1e-30)))

@@ -41,8 +41,8 @@ _DOUBT = 0.5
 class Analysis(eqx.Module):
     """A fitted room with everything that its solution and standard deviations are made of.
 
-    `stated_room` is the room as stated. `coarse`, `first` (on the fine grid) and `other` (another closure) are under
-    the same parameters. `best` is the run under the fitted ones.
+    `stated_room` is the room as stated, `coarse` the same on the coarse grid, and `other` that under another closure.
+    `best` is the run under the fitted parameters.
     `outlet_std_k` is how far what leaves may be from the air at the outlets' height. `rival` is the room that was
     fitted with heat that nobody stated and explains the images about as well; None if there is none.
     """
@@ -54,7 +54,6 @@ class Analysis(eqx.Module):
     stated_room: RoomFields
     derivatives: Derivatives
     coarse: RoomFields
-    first: RoomFields
     other: RoomFields
     best: ForwardRun
     layout: RoomLayout
@@ -128,7 +127,7 @@ def sentences(analysis: Analysis, error: ModelError, doubt: float, moved_k: floa
 def model_error_of(analysis: Analysis) -> ModelError:
     """What the model has wrong: as two closures differ, and two grids, and as the room and its rival do."""
     found = analysis.best.fields
-    pairs = (analysis.coarse, analysis.other), (analysis.coarse, analysis.first)
+    pairs = (analysis.coarse, analysis.other), (analysis.coarse, analysis.stated_room)
     rival = None if analysis.rival is None else (found, analysis.rival)
     return model_error(analysis.data, analysis.posterior, analysis.derivatives, pairs, found, rival)
 

@@ -5,8 +5,8 @@ from core.estimate.marches import work
 from core.estimate.prior import Prior
 from core.room.forward import Room
 
-# Corrections of a fine room before none gains any more, its walls stated or not.
-_STATED_ROUNDS, _UNKNOWN_ROUNDS = 3, 6
+# Steps of a search before none gains any more.
+_ROUNDS = 6
 
 
 def fit_work(coarse: Room, fine: Room, prior: Prior, settings: RoomSettings) -> float:
@@ -19,11 +19,8 @@ def marched_s(prior: Prior, settings: RoomSettings) -> tuple[float, float]:
     """Model seconds of the coarse and of the fine room."""
     restart_s = settings.restarts_s(prior)
     restarts = (1 + len(prior.active())) * restart_s
-    # Walls that nobody has stated move far: derivatives are made again, and corrections go on.
-    far = bool(prior.unknown_walls())
-    rounds = min(settings.rounds, _UNKNOWN_ROUNDS if far else _STATED_ROUNDS)
-    # One coarse correction that is tried, and the second closure's run, beside the Jacobian's.
-    coarse_s = settings.settle_s + (1 + settings.renewals * far) * restarts + 2 * restart_s
-    # The room as stated, and each round.
-    fine_s = (1 + rounds) * settings.refine_s
+    # The Jacobian and its renewals, and the second closure's run.
+    coarse_s = settings.settle_s + (1 + settings.renewals) * restarts + restart_s
+    # The room as stated, and each step.
+    fine_s = (1 + min(settings.rounds, _ROUNDS)) * settings.refine_s
     return coarse_s, fine_s

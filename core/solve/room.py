@@ -33,10 +33,9 @@ from core.estimate.forward_runs import (
     run_under_other_closure,
 )
 from core.estimate.image_noise import with_noise_seen
-from core.estimate.levenberg_marquardt import fine_search
 from core.estimate.marches import Marches, work
 from core.estimate.observation import Observations, observations
-from core.estimate.parameter_fit import REJECTED, Background, coarse_fit, fine_fit
+from core.estimate.parameter_fit import Background, Fit, search
 from core.estimate.parameter_step import Vector, misfit_ratio
 from core.estimate.plane_openings import with_plane_openings
 from core.estimate.posterior import Analysis, solution
@@ -52,6 +51,8 @@ from core.watch import Watch
 
 # Most rounds of a fit with large eddies: a march of them costs some four times what one of a closure does.
 _EDDY_ROUNDS = 3
+# A room whose large eddies leave so many times the misfit of its closure is left as it is.
+_HOPELESS = 1.5
 
 
 def solve_room(problem: Problem, settings: RoomSettings = RoomSettings(), watch: Watch = Watch()) -> Solution:
@@ -153,25 +154,19 @@ def fitted_room(
     coarse, fine, prior = background.coarse, background.fine, background.prior
     vertices = (settings.vertices, settings.vertices, settings.vertices)
     data = with_noise_seen(data_of(background, problem, settings), background.first.fields)
-    vector, base, linearised = coarse_fit(background, data, settings, marches)
-    other = run_under_other_closure(coarse, prior, vector, base, settings, vertices, marches)
-    first = background.first
-    if np.any(vector):
-        where, flow, doing = prior.parameters(vector), first.flow.last, "march the fine room as corrected"
-        first = march_under(fine, where, flow, settings.refine_s, vertices, marches, doing=doing)
+    base, derivatives = background.base, background.derivatives
+    found = Fit.begun(np.zeros(len(prior.active())), background.first)
+    other = run_under_other_closure(coarse, prior, found.posterior.vector, base, settings, vertices, marches)
 
     def renewed(where: Vector, spread: Vector) -> Derivatives:
         nonlocal base
         found, base = perturbed(coarse, prior, where, spread, base, settings, vertices, marches)
         return found
 
-    derivatives = linearised
-    if settings.use_images and prior.unknown_walls():
-        found, derivatives = fine_search(fine, prior, data, first, linearised, renewed, settings, marches)
-    else:
-        found = fine_fit(fine, prior, data, vector, first, linearised, settings, marches)
-    best, stated = found.room, background.first.fields
-    pairs = (other, linearised.start), (stated, best.fields)
+    if settings.use_images:
+        found, derivatives = search(fine, prior, data, found, derivatives, settings, marches, renewed)
+    best, stated, begun = found.room, background.first.fields, background.derivatives.start
+    pairs = (other, begun), (stated, best.fields)
     return Analysis(
         background.problem,
         data,
@@ -179,8 +174,7 @@ def fitted_room(
         found.posterior,
         stated,
         derivatives,
-        coarse=linearised.start,
-        first=first.fields,
+        coarse=begun,
         other=other,
         best=best,
         layout=fine.layout,
@@ -193,7 +187,7 @@ def with_large_eddies(analysis: Analysis, settings: RoomSettings, marches: March
 
     Every entry is taken as it was entered, and what nobody entered, such as heat, as `analysis` has it. Derivatives
     are those of `analysis`: eddies differ from march to march, so a difference of two marches is no derivative. A
-    room whose first march would be rejected as a step of the fit is not corrected, unless the scene asks for eddies.
+    room whose first march fits far worse is not corrected, unless the scene asks for eddies.
     """
     data, kept = analysis.data, [n for n, name in enumerate(analysis.prior.names()) if name != "log_closure"]
     unentered = analysis.prior.gaussian() | analysis.prior.suspected()
@@ -205,9 +199,10 @@ def with_large_eddies(analysis: Analysis, settings: RoomSettings, marches: March
     marches.expect((1 + _EDDY_ROUNDS) * EDDIES_LONGER * work(fine.grid, settings.refine_s))
     where, flow, doing = prior.parameters(found), analysis.best.flow.last, "march the room's large eddies"
     first = march_under(fine, where, flow, settings.refine_s, data.vertices, marches, doing=doing)
-    rejected = misfit_ratio(data, first, analysis.best) > REJECTED and not stated_eddies(analysis)
-    rounds = 0 if rejected else min(settings.rounds, _EDDY_ROUNDS)
-    fit = fine_fit(fine, prior, data, found, first, slopes, replace(settings, rounds=rounds), marches)
+    hopeless = misfit_ratio(data, first, analysis.best) > _HOPELESS and not stated_eddies(analysis)
+    rounds = 0 if hopeless else min(settings.rounds, _EDDY_ROUNDS)
+    begun = Fit.begun(found, first)
+    fit, _ = search(fine, prior, data, begun, slopes, replace(settings, rounds=rounds), marches)
     return replace(
         analysis, prior=prior, posterior=fit.posterior, derivatives=slopes, best=fit.room, layout=fine.layout
     )

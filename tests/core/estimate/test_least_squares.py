@@ -24,9 +24,7 @@ def test_the_closure_is_not_let_go_in_a_wrong_supplys_place():
 def test_where_all_are_trusted_both_move_alike():
     jacobian, residual, variance = np.ones((8, 2)), np.full(8, 2.0), np.ones(8)
 
-    found = gauss_newton(
-        np.zeros(2), residual, variance, jacobian, np.array([False, True]), all_gaussian=True
-    )
+    found = gauss_newton(np.zeros(2), residual, variance, jacobian, np.array([True, True]))
 
     # 8 (2 - a - b) = a = b.
     assert found.vector == pytest.approx(np.full(2, 16.0 / 17.0))

@@ -93,9 +93,9 @@ def test_stopped_anywhere_it_goes_on_to_bitwise_the_same_end(
         # In the first march, after a window of it.
         (4, "march the coarse room", [cut]),
         # While two threads march, whether or not either has a window to keep.
-        (questions.count // 4, "move one parameter", [some, some | cut]),
-        # At the last question: in the last march, all others ended.
-        (questions.count - 1, "correct the fine room", [some | cut]),
+        (questions.count // 2, "move one parameter", [some, some | cut]),
+        # At the last question: in the last restart, for the deviations of what was found.
+        (questions.count - 1, "move one parameter", [some, some | cut]),
     ):
         store: dict[str, bytes] = {}
         told = stopped(problem, store, Asked(n))
