@@ -134,7 +134,8 @@ def _sure(finding: Finding) -> str:
     )
     if finding.scores is None:
         return f"{sure} There is no truth to compare with; what was taken on trust is listed below."
-    wrong = f"{finding.scores['T']['rms_K']:.2f} K"
+    # Without the walls' surfaces, which no camera sees: "a usual place" is in the air.
+    wrong = f"{finding.scores['T']['air']['rms_K']:.2f} K in the air"
     if finding.scores["u"]:
         wrong += f" and {100 * finding.scores['u']['rel']:.0f} % of the usual speed"
     return f"{sure} This room is simulated, so its truth is known: the answer is wrong by {wrong}."

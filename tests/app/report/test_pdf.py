@@ -3,6 +3,7 @@
 import dataclasses
 import re
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -13,6 +14,7 @@ from app.report.finding import read_finding
 from app.report.indoor import told
 from app.report.pdf import _short, method, write_pdf
 from core.estimate.diagnostics import doubtful, other_way
+from core.metrics import score_temperature
 from tests.app.report.test_indoor import experiment  # noqa: F401
 
 
@@ -53,6 +55,15 @@ def test_where_no_velocity_was_found_the_answer_says_so(finding):
     assert said[1].startswith(
         "At the ceiling the air is 3.6 K warmer than at the floor; its velocity was not found"
     )
+
+
+def test_the_error_that_is_told_is_that_of_the_air_and_not_of_surfaces(finding):
+    found_k = np.asarray(finding.solution.temperature_k)
+    true_k = found_k + 0.25
+    true_k[:, :, 0] += 20.0
+    known = dataclasses.replace(finding)
+    vars(known)["scores"] = {"T": score_temperature(found_k, true_k, 293.15), "u": None}
+    assert summary(known)[2].endswith("the answer is wrong by 0.25 K in the air.")
 
 
 def test_a_text_that_is_too_long_for_the_pdf_ends_with_a_whole_sentence():
