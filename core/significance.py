@@ -3,6 +3,7 @@
 from scipy.special import ndtri
 
 FALSE_ALARMS = 0.05
-# Standard deviations that a normal quantity leaves, in so many cases, to one side only, and to either side.
+# A normal quantity lies more standard deviations than these off its mean in one case of twenty: to one side that was
+# chosen before, and to either side.
 TO_ONE_SIDE = float(ndtri(1.0 - FALSE_ALARMS))
 EITHER_WAY = float(ndtri(1.0 - 0.5 * FALSE_ALARMS))

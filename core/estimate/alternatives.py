@@ -46,7 +46,7 @@ def suspected_heat(
 
 
 def explains_more(warm: Analysis, without: Analysis) -> bool:
-    """Whether the room with suspected heat explains more of the images than its panels do by chance, once in twenty.
+    """Whether the room with suspected heat explains more of the images than chance would, which passes once in 20.
 
     Twice the logarithm of the likelihoods' ratio, of the images' data that err by themselves, has a chi-square
     distribution (Wilks 1938). Its degrees of freedom are the heat of the panel and of its neighbours.

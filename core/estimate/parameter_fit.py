@@ -11,14 +11,13 @@ from collections.abc import Callable
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Float
 
 from core.estimate.forward_runs import Derivatives, ForwardRun, RoomSettings, march_under
 from core.estimate.least_squares import LONGEST_STEP, Posterior
 from core.estimate.marches import Marches
 from core.estimate.observation import Observations
 from core.estimate.parameter_names import by_name
-from core.estimate.parameter_step import Jacobian, Vector, corrected, farthest, misfit_ratio, secant
+from core.estimate.parameter_step import Vector, corrected, farthest, misfit_ratio, secant
 from core.estimate.prior import Prior
 from core.problem import Problem
 from core.room.forward import Room
@@ -81,8 +80,19 @@ def search(
     stale, renewals, trust_radius = 0, settings.renewals, longest
     jacobian = derivatives.per_deviation(data.predicted).T
     for n in range(settings.rounds):
-        new = searched(
-            fine, prior, data, best, jacobian, grid_difference, trust_radius, settings, marches, far=far
+        asked = corrected(
+            best.posterior.vector,
+            best.room,
+            data,
+            jacobian,
+            grid_difference,
+            gaussian=prior.gaussian(),
+            far=far,
+            trust_radius=trust_radius,
+        )
+        where, flow = prior.parameters(asked.vector), best.room.flow.last
+        new = Fit(
+            asked, march_under(fine, where, flow, settings.refine_s, data.vertices, marches, doing=_DOING)
         )
         left = misfit_ratio(data, new.room, best.room)
         values = by_name(prior, new.posterior.vector)
@@ -103,33 +113,3 @@ def search(
         elif done:
             break
     return best, derivatives
-
-
-def searched(
-    fine: Room,
-    prior: Prior,
-    data: Observations,
-    best: Fit,
-    jacobian: Jacobian,
-    grid_difference: Float[np.ndarray, " data"],
-    trust_radius: float | None,
-    settings: RoomSettings,
-    marches: Marches,
-    *,
-    far: bool,
-) -> Fit:
-    """One step from the best room, and the forward run under the new parameters."""
-    where, gaussian = best.posterior.vector, prior.gaussian()
-    asked = corrected(
-        where,
-        best.room,
-        data,
-        jacobian,
-        grid_difference,
-        gaussian=gaussian,
-        far=far,
-        trust_radius=trust_radius,
-    )
-    parameters, flow = prior.parameters(asked.vector), best.room.flow.last
-    seconds, seen_on = settings.refine_s, data.vertices
-    return Fit(asked, march_under(fine, parameters, flow, seconds, seen_on, marches, doing=_DOING))

@@ -160,13 +160,13 @@ def fitted_room(
 
     def renewed(where: Vector, spread: Vector) -> Derivatives:
         nonlocal base
-        found, base = perturbed(coarse, prior, where, spread, base, settings, vertices, marches)
-        return found
+        slopes, base = perturbed(coarse, prior, where, spread, base, settings, vertices, marches)
+        return slopes
 
     if settings.use_images:
         found, derivatives = search(fine, prior, data, found, derivatives, settings, marches, renewed)
-    best, stated, begun = found.room, background.first.fields, background.derivatives.start
-    pairs = (other, begun), (stated, best.fields)
+    best, stated, stated_coarse = found.room, background.first.fields, background.derivatives.start
+    pairs = (other, stated_coarse), (stated, best.fields)
     return Analysis(
         background.problem,
         data,
@@ -174,7 +174,7 @@ def fitted_room(
         found.posterior,
         stated,
         derivatives,
-        coarse=begun,
+        coarse=stated_coarse,
         other=other,
         best=best,
         layout=fine.layout,
