@@ -9,6 +9,7 @@ from app.report.beside import places, rows
 from app.simulate.demo import WORLD, run_demo
 from app.simulate.worlds import LAB
 from app.volume.sample import SAMPLE_ROOM
+from core.significance import EITHER_WAY
 from tests.app.report.test_indoor import OPENINGS, PLUG_ROOM, layered, replace
 
 
@@ -31,7 +32,7 @@ def test_places_have_their_values_and_intervals():
     assert jet.at_m[0] == pytest.approx(1.0)
     # 295 K at the floor, 2 K/m, and 0.05 K of deviation.
     assert middle.celsius == pytest.approx(295.0 + 2.0 - 273.15)
-    assert middle.celsius_half == pytest.approx(1.96 * 0.05)
+    assert middle.celsius_half == pytest.approx(EITHER_WAY * 0.05)
     assert head.celsius - ankles.celsius == pytest.approx(2.0)
     assert middle.speed_m_s == pytest.approx(0.1)
     # Along x alone: the deviation of the velocity along itself.
