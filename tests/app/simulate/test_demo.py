@@ -36,7 +36,7 @@ def test_places_have_their_values_and_intervals():
     assert head.celsius - ankles.celsius == pytest.approx(2.0)
     assert middle.speed_m_s == pytest.approx(0.1)
     # Along x alone: the deviation of the velocity along itself.
-    assert middle.speed_half_m_s == pytest.approx(0.0196)
+    assert middle.speed_half_m_s == pytest.approx(EITHER_WAY * 0.01)
     assert rows(found)[1][1] == "23.85 ± 0.10 °C"
     assert rows(found)[1][2] == "-"
 
