@@ -2,7 +2,9 @@
 
 Arrays are indexed [ix, iy, iz] at vertices x, y, z [m], end planes included. T in K, kinematic p in m2/s2,
 u in m/s with the last axis x, y, z. `solid` marks vertices in or on obstacles, where values mean nothing (NaN, too).
-`meta_json` may describe the case: domain, inlets, outlet, heater, walls.
+`meta_json` may describe the case: domain, inlets, outlet or outlets, heater, walls. An opening stands on xMinWall
+unless its `wall` names another (xMaxWall, front, back, floor, ceiling); it spans two axes of that wall, such as
+`"x": [1.0, 1.4], "y": [0.0, 0.3]`, and its `U` [m/s] enters at right angles.
 """
 
 import json

@@ -11,7 +11,7 @@ from app.errors import BadInputError
 from app.files.durable import durable_path
 from app.volume.file import RoomVolume
 from core.air import GAS_CONSTANT_DRY_AIR_J_KG_K, Air
-from core.geometry import WALLS, Box, Optics, Vector2, Vector3, WallName, looking_along_y
+from core.geometry import WALLS, Box, Optics, Vector2, Vector3, WallName, face_of, looking_along_y
 from core.objects import RoomObject
 from core.plan.print_choice import suited_print
 from core.scene import (
@@ -221,7 +221,7 @@ def known_boundary(volume: RoomVolume, information: Information) -> list[Boundar
                 f"--information {information} needs. Use --information paper."
             )
         known += [_inlet(inlet, volume) for inlet in volume.case.get("inlets", [])]
-        known += _outlet(volume)
+        known += _outlets(volume)
         known += [_wall(name, wall, volume, information) for name, wall in _WALLS.items()]
     if information == "surveyed" and volume.case.get("heater"):
         known.append(heater_of(volume))
@@ -298,10 +298,14 @@ def projected(camera: Optics, projector: Optics, seed: int) -> ProjectedPattern:
 
 
 def _inlet(inlet: dict[str, Any], volume: RoomVolume) -> Inlet:
+    patch = _patch(inlet)
+    face = face_of(patch.wall)
+    inward_m_s = face.inward * float(inlet["U"])
+    x, y, z = (inward_m_s if axis == face.axis else 0.0 for axis in range(3))
     return Inlet(
-        patch=_patch(inlet),
+        patch=patch,
         temperature_k=volume.ambient_k + float(inlet["dT"]),
-        velocity_m_s=(float(inlet["U"]), 0.0, 0.0),
+        velocity_m_s=(x, y, z),
         turbulence_intensity=float(volume.case.get("TI", 0.1)),
         length_scale_m=_length_scale_m(inlet, volume),
     )
@@ -313,30 +317,32 @@ def _length_scale_m(inlet: dict[str, Any], volume: RoomVolume) -> float | None:
     return None if share is None else float(share) * _patch(inlet).hydraulic_diameter_m
 
 
-def _outlet(volume: RoomVolume) -> list[Outlet]:
-    if not volume.case.get("outlet"):
-        return []
-    patch = _patch(volume.case["outlet"])
-    return [Outlet(patch=patch, mean_temperature_k=_leaving_k(volume, patch))]
+def _outlets(volume: RoomVolume) -> list[Outlet]:
+    one = volume.case.get("outlet")
+    patches = [_patch(box) for box in volume.case.get("outlets") or ([one] if one else [])]
+    return [Outlet(patch=patch, mean_temperature_k=_leaving_k(volume, patch)) for patch in patches]
 
 
 def _leaving_k(volume: RoomVolume, patch: Patch) -> float:
-    """Temperature of what leaves by a patch of x_min: the mean of the air one vertex before it, weighted by outflow.
+    """Temperature of what leaves by a patch: the mean of the air one vertex before it, weighted by outflow.
 
     Not on the patch itself: near its rim a vertex shows a part of the wall's temperature.
     """
-    lower, upper = patch.lower_m, patch.upper_m
+    lower, upper, face = patch.lower_m, patch.upper_m, face_of(patch.wall)
+    axes = (volume.x_m, volume.y_m, volume.z_m)
     inside = np.ix_(*(
-        (axis_m >= low_m - 1e-6) & (axis_m <= high_m + 1e-6)
-        for axis_m, low_m, high_m in zip((volume.y_m, volume.z_m), lower, upper, strict=True)
+        (axes[a] >= low_m - 1e-6) & (axes[a] <= high_m + 1e-6)
+        for a, low_m, high_m in zip(face.along, lower, upper, strict=True)
     ))  # fmt: skip
-    air_k = volume.temperature_k[1][inside].astype(np.float64)
+    beside = -2 if face.upper else 1
+    air_k = np.take(volume.temperature_k, beside, face.axis)[inside].astype(np.float64)
     if air_k.size == 0:
         raise BadInputError(
-            f"The outlet {lower} to {upper} m lies between the volume's vertices; "
+            f"The outlet {lower} to {upper} m on {patch.wall} lies between the volume's vertices; "
             "resample the volume on a finer grid."
         )
-    leaving = np.maximum(-volume.velocity_m_s[0, ..., 0][inside].astype(np.float64), 0.0)
+    through_m_s = np.take(volume.velocity_m_s[..., face.axis], face.end, face.axis)[inside]
+    leaving = np.maximum(-face.inward * through_m_s.astype(np.float64), 0.0)
     return float(np.average(air_k, weights=leaving if leaving.any() else None))
 
 
@@ -364,8 +370,19 @@ def heater_of(volume: RoomVolume) -> Heater:
 
 
 def _patch(box: dict[str, Any]) -> Patch:
-    y, z = box["y"], box["z"]
-    return Patch(wall="x_min", lower_m=(float(y[0]), float(z[0])), upper_m=(float(y[1]), float(z[1])))
+    name = str(box.get("wall", "xMinWall"))
+    if name not in _WALLS:
+        raise BadInputError(
+            f"An opening of the volume's case stands on {name!r}; expected one of {', '.join(_WALLS)}."
+        )
+    first, second = ("xyz"[axis] for axis in face_of(_WALLS[name]).along)
+    if first not in box or second not in box:
+        raise BadInputError(
+            f"An opening of the volume's case on {name} has no span along {first} and {second}; expected "
+            f"{first} = [lower, upper] and {second} = [lower, upper] in metres."
+        )
+    (a, b), (c, d) = box[first], box[second]
+    return Patch(wall=_WALLS[name], lower_m=(float(a), float(c)), upper_m=(float(b), float(d)))
 
 
 def _round(value: float) -> float:

@@ -1,11 +1,14 @@
 """Rooms as `random_rooms` draws them, computed by OpenFOAM (where it is installed) under one of its three models.
 
 k-epsilon, RNG k-epsilon and k-omega SST by turns; the steady solver from rest, and the mean over its later
-iterations. Not a benchmark by itself: `random_rooms --by openfoam` takes its rooms from here.
+iterations. OpenFOAM's openings are whole faces of cells. So each opening and heater is moved to faces first, and the
+volume states the room that is computed. Not a benchmark by itself: `random_rooms --by openfoam` takes its rooms from
+here.
 """
 
 import re
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,6 +21,7 @@ from core.air import GRAVITY_M_S2
 from core.geometry import face_of
 from core.known import stated_walls
 from core.room.forward import room
+from core.room.room_grid import RoomGrid
 from core.scene import Heater, Inlet, Outlet, Scene
 from tests.benchmarks.other_rooms import Made, arrays_of, empty, on_vertices
 
@@ -30,9 +34,10 @@ def computed(
     name: str, what: Made, model: Turbulence, cells: int = 40
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """The room's arrays, and a row about how it was made. Raises BadInputError where OpenFOAM fails."""
+    grid = room(room_scene(empty(name, what), RigOptions(), "surveyed"), cells, "k_epsilon").grid
+    what = on_faces(what, grid)
     volume = empty(name, what)
     scene = room_scene(volume, RigOptions(), "surveyed")
-    grid = room(scene, cells, "k_epsilon").grid
     variables = environment()
     with tempfile.TemporaryDirectory() as folder:
         case = Path(folder)
@@ -64,6 +69,28 @@ def computed(
         for field in (kelvin, pressure + GRAVITY_M_S2 * height_m * buoyancy, velocity, nut)
     )
     return arrays_of(what, volume, kelvin, pressure - pressure.mean(), velocity, nut, model), row
+
+
+def on_faces(what: Made, grid: RoomGrid) -> Made:
+    """The room with its openings and its heater moved to faces of cells; none is narrower than a cell."""
+
+    def moved(box: dict[str, Any]) -> dict[str, Any]:
+        spans = {
+            name: _nearest(box[name], grid.faces_m(axis)) for axis, name in enumerate("xyz") if name in box
+        }
+        return box | spans
+
+    return replace(
+        what,
+        inlets=tuple(map(moved, what.inlets)),
+        outlets=tuple(map(moved, what.outlets)),
+        heater=None if what.heater is None else moved(what.heater),
+    )
+
+
+def _nearest(span_m: list[float], faces_m: np.ndarray) -> list[float]:
+    first, last = (int(np.argmin(np.abs(faces_m - edge))) for edge in span_m)
+    return [round(float(faces_m[n]), 6) for n in (first, max(last, first + 1))]
 
 
 def _on_walls(

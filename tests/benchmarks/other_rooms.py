@@ -43,7 +43,7 @@ class Made:
     cells: int
     title: str
     inlets: tuple[dict[str, Any], ...] = ()
-    outlet: dict[str, Any] | None = None
+    outlets: tuple[dict[str, Any], ...] = ()
     heater: dict[str, Any] | None = None
     wall_t: tuple[tuple[str, float], ...] = ()
     adiabatic: tuple[str, ...] = tuple(INSULATED)
@@ -65,7 +65,7 @@ ROOMS = {
         cells=64,
         title="cool jet below the ceiling, zero-equation truth",
         inlets=({**_box((-0.35, 0.35), (2.25, 2.45)), "U": 0.6, "dT": -5.0},),
-        outlet=_box((0.6, 1.2), (0.2, 0.6)),
+        outlets=(_box((0.6, 1.2), (0.2, 0.6)),),
         wall_t=(("back", T0_K + 1.0),),
     ),
     "plume": Made(
@@ -75,7 +75,7 @@ ROOMS = {
         cells=56,
         title="plume over a heated floor patch, displacement supply",
         inlets=({**_box((-0.6, 0.6), (0.05, 0.45)), "U": 0.12, "dT": -1.0},),
-        outlet=_box((-0.3, 0.3), (2.7, 3.0)),
+        outlets=(_box((-0.3, 0.3), (2.7, 3.0)),),
         heater={"x": [0.2, 0.8], "y": [-0.3, 0.3], "dT": 60.0},
         closure_factor=1.3,
     ),
@@ -86,7 +86,7 @@ ROOMS = {
         cells=56,
         title="plume over a warm floor patch, supply at the room's temperature",
         inlets=({**_box((-0.5, 0.5), (0.1, 0.5)), "U": 0.05, "dT": 0.0},),
-        outlet=_box((-0.3, 0.3), (2.25, 2.5)),
+        outlets=(_box((-0.3, 0.3), (2.25, 2.5)),),
         heater={"x": [0.0, 0.6], "y": [-0.2, 0.4], "dT": 25.0},
         closure_factor=0.8,
     ),
@@ -100,7 +100,7 @@ ROOMS = {
             {**_box((-0.9, -0.4), (1.7, 1.95)), "U": 0.4, "dT": 6.0},
             {**_box((0.5, 0.9), (1.1, 1.35)), "U": 0.5, "dT": -2.0},
         ),
-        outlet=_box((-0.3, 0.3), (0.15, 0.5)),
+        outlets=(_box((-0.3, 0.3), (0.15, 0.5)),),
     ),
     "constant": Made(
         domain=(-1.0, 2.6, -1.3, 1.7, 0.0, 2.9),
@@ -109,7 +109,7 @@ ROOMS = {
         cells=56,
         title="warm jet off the middle, constant eddy viscosity",
         inlets=({**_box((-0.1, 0.5), (1.3, 1.55)), "U": 0.45, "dT": 7.0},),
-        outlet=_box((-0.9, -0.3), (2.2, 2.6)),
+        outlets=(_box((-0.9, -0.3), (2.2, 2.6)),),
     ),
 }
 
@@ -164,7 +164,7 @@ def empty(name: str, what: Made) -> RoomVolume:
         "Prt": 0.85,
         "g": 9.81,
         "domain": list(what.domain),
-        "outlet": what.outlet,
+        "outlets": list(what.outlets),
         "adiabatic_walls": list(what.adiabatic),
         "TI": 0.1,
         "lscale": 0.07,
@@ -215,7 +215,7 @@ def arrays_of(
     solver: str,
 ) -> dict[str, Any]:
     """The volume's arrays, named as in the format; fields are on its vertices."""
-    inlets = what.inlets
+    inlets = [i for i in what.inlets if _on_x_min(i)]
     arrays = {"x": volume.x_m, "y": volume.y_m, "z": volume.z_m}
     arrays |= {"T": temperature_k, "p": pressure_m2_s2, "u": velocity_m_s, "nut": nut_m2_s}
     arrays |= {f"bc_{k}": arrays[k][0] for k in ("T", "p", "u", "nut")}
@@ -235,14 +235,20 @@ def arrays_of(
 
 
 def _mask(what: Made, volume: RoomVolume) -> np.ndarray:
-    """1, 2 inlets, -1 outlet, 0 wall on x_min."""
+    """1, 2 inlets, -1 outlets, 0 wall on x_min."""
     mask = np.zeros((len(volume.y_m), len(volume.z_m)), np.int8)
-    patches = [(n + 1, i) for n, i in enumerate(what.inlets)]
+    patches = [(n + 1, i) for n, i in enumerate(what.inlets)] + [(-1, box) for box in what.outlets]
     axes = {"y": volume.y_m, "z": volume.z_m}
-    for value, box in [*patches, *([(-1, what.outlet)] if what.outlet else [])]:
+    for value, box in patches:
+        if not _on_x_min(box):
+            continue
         inside = [(axis >= box[a][0]) & (axis <= box[a][1]) for a, axis in axes.items()]
         mask[np.ix_(*inside)] = value
     return mask
+
+
+def _on_x_min(box: dict[str, Any]) -> bool:
+    return box.get("wall", "xMinWall") == "xMinWall"
 
 
 def main() -> None:

@@ -1,11 +1,12 @@
 """Rooms drawn at random, fitted as an operator would: how large the error is, and whether the result knows it.
 
-One to three supplies and an outlet on x_min, 0.05 to 1 m/s, -10 to +10 K, boxes of 2.4 to 8 m, walls adiabatic or of
-their own temperature, and in half of the rooms a heated panel of the floor, which half of these operators state. The
-truth is marched by `core.room` under k-epsilon with other constants, or under the zero-equation closure, on a finer
-grid; or it is computed by OpenFOAM under its k-epsilon, RNG k-epsilon or k-omega SST (`--by openfoam`). Entries are
-misread as far as their deviations say. Rooms of even number are for choosing anything, those of odd
-number for figures; from 1000 on they are for nobody to look at.
+One to three supplies of 0.05 to 1 m/s and -10 to +10 K, and an outlet, all on x_min; from number 101 on one or two
+outlets, and all on any wall but the patterned one and the floor. Boxes of 2.4 to 8 m, walls adiabatic or of their own
+temperature, and in half of the rooms a heated panel of the floor, which half of these operators state. The truth is
+marched by `core.room` under k-epsilon with other constants, or under the zero-equation closure, on a finer grid; or
+it is computed by OpenFOAM under k-epsilon, RNG k-epsilon or k-omega SST (`--by openfoam`). Entries are misread as far
+as their deviations say. Rooms of even number are for choosing anything, those of odd number for figures; from 1000 on
+they are for nobody to look at.
 
     python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32] [--by openfoam]
         [--views y,x] [--information surveyed]
@@ -40,6 +41,10 @@ from tests.benchmarks.other_rooms import T0_K, Made, marched
 
 _SEED = 2611
 _NAMES = ("xMinWall", "xMaxWall", "front", "back", "floor", "ceiling")
+# From this number on, openings stand on any wall but the patterned one and the floor.
+_ON_ANY_WALL = 100
+# Each wall's axis, and the two along it; the ceiling twice, for it holds most supplies.
+_OPEN = (("xMinWall", "yz"), ("xMaxWall", "yz"), ("front", "xz"), ("ceiling", "xy"), ("ceiling", "yx"))
 # Between two openings, and between an opening and the wall's edge.
 _MARGIN_M = 0.1
 
@@ -49,17 +54,20 @@ def drawn(number: int) -> Made:
     draw = np.random.default_rng([_SEED, number])
     size = np.round([draw.uniform(2.4, 8.0), draw.uniform(2.4, 8.0), draw.uniform(2.4, 3.6)], 1)
     domain = (0.0, float(size[0]), -float(size[1]) / 2, float(size[1]) / 2, 0.0, float(size[2]))
-    openings = _openings(draw, int(draw.integers(2, 5)), domain)
+    openings, outlets = _openings(draw, int(draw.integers(2, 5)), domain), 1
+    if number >= _ON_ANY_WALL:
+        outlets = int(draw.integers(1, 3))
+        openings = _openings_anywhere(draw, len(openings) - 1 + outlets, domain)
     inlets = tuple(
         {
             **place,
             "U": round(float(np.exp(draw.uniform(np.log(0.05), 0.0))), 3),
             "dT": round(float(draw.uniform(-10.0, 10.0)), 2),
         }
-        for place in openings[1:]
+        for place in openings[outlets:]
     )
     adiabatic = tuple(name for name in _NAMES if draw.random() < 0.4)
-    supply_m3_s = sum(i["U"] * float(np.ptp(i["y"]) * np.ptp(i["z"])) for i in inlets)
+    supply_m3_s = sum(i["U"] * _area_m2(i) for i in inlets)
     walls = tuple((name, T0_K + round(float(2.0 * draw.standard_normal()), 2)) for name in _NAMES)
     return Made(
         domain=domain,
@@ -68,7 +76,7 @@ def drawn(number: int) -> Made:
         cells=44,
         title=f"room {number}, drawn at random",
         inlets=inlets,
-        outlet=openings[0],
+        outlets=tuple(openings[:outlets]),
         heater=_heater(draw, domain) if draw.random() < 0.5 else None,
         wall_t=tuple(wall for wall in walls if wall[0] not in adiabatic),
         adiabatic=adiabatic,
@@ -91,6 +99,30 @@ def _openings(draw: np.random.Generator, count: int, domain: tuple[float, ...]) 
         if all(_apart(new, old, "y") or _apart(new, old, "z") for old in found):
             found.append(new)
     return found
+
+
+def _openings_anywhere(
+    draw: np.random.Generator, count: int, domain: tuple[float, ...]
+) -> list[dict[str, Any]]:
+    """Rectangles on any wall that may have one, the longer side along a wall's first axis, that do not meet."""
+    bounds = dict(zip("xyz", (domain[:2], domain[2:4], domain[4:]), strict=True))
+    found: list[dict[str, Any]] = []
+    while len(found) < count:
+        wall, along = _OPEN[draw.integers(len(_OPEN))]
+        new: dict[str, Any] = {"wall": wall}
+        for axis, sizes_m in zip(along, ((0.3, 1.2), (0.15, 0.5)), strict=True):
+            low, high = bounds[axis]
+            size_m = draw.uniform(*sizes_m)
+            start_m = draw.uniform(low + _MARGIN_M, high - _MARGIN_M - size_m)
+            new[axis] = [round(start_m, 2), round(start_m + size_m, 2)]
+        beside = [old for old in found if old["wall"] == wall]
+        if all(any(_apart(new, old, axis) for axis in along) for old in beside):
+            found.append(new)
+    return found
+
+
+def _area_m2(box: dict[str, Any]) -> float:
+    return float(np.prod([np.ptp(box[axis]) for axis in "xyz" if axis in box]))
 
 
 def _apart(one: dict[str, Any], other: dict[str, Any], axis: str) -> bool:

@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.errors import BadInputError
 from app.volume.file import RoomVolume
 from app.volume.scene import known_boundary
-from core.scene import Outlet
+from core.scene import Inlet, Outlet, Patch
 
 VERTICES = (5, 21, 21)
 CELL_M = 0.12
@@ -30,6 +32,13 @@ def volume_of(outlet: dict[str, list[float]]) -> RoomVolume:
     return RoomVolume(
         x, y, z, temperature, np.zeros(VERTICES, np.float32), velocity, 293.15, case={"outlet": outlet}
     )
+
+
+def still() -> RoomVolume:
+    """Still air of one temperature, on five vertices along x."""
+    x, y, z = (np.linspace(0.0, 2.0, n) for n in VERTICES)
+    zero = np.zeros(VERTICES, np.float32)
+    return RoomVolume(x, y, z, zero + np.float32(293.0), zero, np.zeros((*VERTICES, 3), np.float32), 293.15)
 
 
 def within(axis: np.ndarray, span: list[float], margin_m: float) -> np.ndarray:
@@ -66,3 +75,49 @@ def test_what_leaves_counts_by_how_fast_it_leaves():
 def test_an_outlet_between_the_vertices_is_refused():
     with pytest.raises(BadInputError, match="finer grid"):
         read_k(volume_of({"y": [0.5, 1.5], "z": [0.22, 0.28]}))
+
+
+@pytest.mark.parametrize(
+    ("box", "wall", "velocity_m_s"),
+    [
+        ({"y": [0.5, 1.0], "z": [0.2, 0.6]}, "x_min", (0.3, 0.0, 0.0)),
+        ({"wall": "xMaxWall", "y": [0.5, 1.0], "z": [0.2, 0.6]}, "x_max", (-0.3, 0.0, 0.0)),
+        ({"wall": "front", "x": [0.5, 1.0], "z": [0.2, 0.6]}, "y_min", (0.0, 0.3, 0.0)),
+        ({"wall": "ceiling", "x": [0.5, 1.0], "y": [0.2, 0.6]}, "z_max", (0.0, 0.0, -0.3)),
+    ],
+)
+def test_a_supply_blows_into_the_room_from_its_own_wall(box, wall, velocity_m_s):
+    volume = replace(still(), case={"inlets": [{**box, "U": 0.3, "dT": 2.0}]})
+
+    (inlet,) = (part for part in known_boundary(volume, "operator") if isinstance(part, Inlet))
+
+    assert inlet.patch == Patch(wall=wall, lower_m=(0.5, 0.2), upper_m=(1.0, 0.6))
+    assert inlet.velocity_m_s == velocity_m_s
+
+
+def test_each_of_several_outlets_reads_what_leaves_by_it():
+    high = {"wall": "ceiling", "x": [0.4, 1.6], "y": [0.4, 1.6]}
+    low = {"wall": "xMaxWall", "y": [0.4, 1.6], "z": [0.2, 0.8]}
+    volume = replace(still(), case={"outlets": [high, low]})
+    volume.temperature_k[..., -2], volume.temperature_k[-2, :, :-2] = 300.0, 290.0
+    # Air leaves by the ceiling's half nearer to x_min, which is warmer, and enters by the other.
+    volume.temperature_k[:2, :, -2] = 302.0
+    volume.velocity_m_s[..., -1, 2] = -0.1
+    volume.velocity_m_s[:2, :, -1, 2] = 0.2
+
+    found = [part for part in known_boundary(volume, "operator") if isinstance(part, Outlet)]
+
+    assert [part.patch.wall for part in found] == ["z_max", "x_max"]
+    assert [part.mean_temperature_k for part in found] == [pytest.approx(302.0), pytest.approx(290.0)]
+
+
+@pytest.mark.parametrize(
+    ("box", "said"),
+    [
+        ({"wall": "roof", "x": [0.4, 1.6], "y": [0.4, 1.6]}, "'roof'; expected one of xMinWall"),
+        ({"wall": "ceiling", "y": [0.4, 1.6], "z": [0.4, 1.6]}, "no span along x and y"),
+    ],
+)
+def test_an_opening_that_is_on_no_wall_is_refused(box, said):
+    with pytest.raises(BadInputError, match=said):
+        known_boundary(replace(still(), case={"outlet": box}), "operator")
