@@ -8,6 +8,7 @@ from itertools import combinations
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Float
 from scipy.interpolate import RegularGridInterpolator
 
 from core.geometry import WALLS, WallName, face_of
@@ -54,16 +55,55 @@ def measured_outlets(scene: Scene) -> list[tuple[int, Outlet, float]]:
     ]
 
 
+def supplied_m3_s(scene: Scene) -> float:
+    """Volume flow of all supplies, as stated."""
+    return sum(
+        (
+            face.inward * inlet.velocity_m_s[face.axis] * inlet.patch.area_m2
+            for inlet in scene.boundary
+            if isinstance(inlet, Inlet)
+            for face in [face_of(inlet.patch.wall)]
+        ),
+        start=0.0,
+    )
+
+
+def outlet_shares(scene: Scene) -> Float[np.ndarray, " outlets"]:
+    """Of the air that leaves, what leaves by each outlet: by the flows that are stated, what remains by area.
+
+    Where every outlet's flow is stated their ratios are kept, whatever the supplies bring.
+
+    Raises:
+        SettingError: stated flows leave nothing to the outlets without one.
+    """
+    outlets = [part for part in scene.boundary if isinstance(part, Outlet)]
+    areas_m2 = np.array([outlet.patch.area_m2 for outlet in outlets])
+    flows_m3_s = np.array([outlet.flow_m3_s or 0.0 for outlet in outlets])
+    free = flows_m3_s == 0.0
+    if free.all():
+        return areas_m2 / max(float(areas_m2.sum()), 1e-12)
+    if free.any():
+        supplied, stated = supplied_m3_s(scene), float(flows_m3_s.sum())
+        if stated >= supplied:
+            raise SettingError(
+                f"The outlets' stated flows are {3600 * stated:.4g} m3/h in all and the supplies bring "
+                f"{3600 * supplied:.4g} m3/h, so nothing is left for an outlet without a flow. Correct the flows, "
+                "or state that of every outlet."
+            )
+        flows_m3_s = np.where(free, (supplied - stated) * areas_m2 / areas_m2[free].sum(), flows_m3_s)
+    return flows_m3_s / flows_m3_s.sum()
+
+
 def leaving_excess_k(problem: Problem) -> float | None:
     """Mean temperature of the air that leaves, in excess of ambient; None where nothing tells it.
 
-    By the outlets' thermometers, each weighted with its area as the flow divides; else by a plane's outflow.
+    By the outlets' thermometers, each weighted with what leaves there; else by a plane's outflow.
     """
     ambient_k = problem.scene.air.ambient_temperature_k
     measured = measured_outlets(problem.scene)
     if measured:
-        areas = np.array([outlet.patch.area_m2 for _, outlet, _ in measured])
-        return float(np.dot(areas / areas.sum(), [kelvin - ambient_k for *_, kelvin in measured]))
+        shares = outlet_shares(problem.scene)[[n for n, *_ in measured]]
+        return float(np.dot(shares / shares.sum(), [kelvin - ambient_k for *_, kelvin in measured]))
     for plane in problem.planes:
         face = face_of(plane.wall)
         leaving = np.maximum(-face.inward * plane.velocity_m_s[..., face.axis], 0.0)

@@ -285,6 +285,8 @@ class Outlet:
     kind: Literal["outlet"] = "outlet"
     patch: Patch
     """Where air leaves."""
+    flow_m3_s: float | None = None
+    """What leaves by it; outlets without it share what remains of the supplies' flow by area."""
     mean_temperature_k: float | None = None
     """A thermometer in it; without it the outlet fixes no level."""
     temperature_std_k: float = 0.1
@@ -293,6 +295,11 @@ class Outlet:
     def __post_init__(self) -> None:
         if self.mean_temperature_k is not None:
             check_kelvin("The outlet's mean temperature", self.mean_temperature_k)
+        if self.flow_m3_s is not None and not 0.0 < self.flow_m3_s < 100.0:
+            raise SettingError(
+                f"The outlet's flow_m3_s is {self.flow_m3_s:g} m3/s; expected what leaves by it, above 0 and below "
+                "100 m3/s. Leave it out where it is not known."
+            )
         _check_std("The outlet's temperature_std_k", self.temperature_std_k, "K")
 
 

@@ -120,6 +120,8 @@ def _ask_supply(tree: Tree, kind: str, path: Path, name: str) -> Asked:
 
 def _ask_outlet(tree: Tree, kind: str, path: Path, name: str) -> Asked:
     yield from _ask_opening(tree, path, name)
+    if len(tree[kind]) > 1:
+        yield from ask_field(tree, (*path, "flow"), f"{name}: flow", "m3/h", can_be_open=True)
     yield from ask_temperature(tree, path, name, _DEVIATIONS[kind], can_be_open=True)
 
 

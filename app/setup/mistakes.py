@@ -102,6 +102,7 @@ def _contradictions(parts: Parts) -> list[Said]:
         _off_its_wall,
         _overlaps,
         _too_fast,
+        _nothing_left,
         _behind_the_wall,
         _outside_the_room,
         _objects_outside,
@@ -187,13 +188,34 @@ def _trapped_air(supplies: int, outlets: int) -> Iterator[Said]:
 
 def _too_fast(parts: Parts) -> Iterator[Said]:
     for path, item in _named(parts, "supply"):
-        area_m2 = (item.upper[0] - item.lower[0]) * (item.upper[1] - item.lower[1])
+        area_m2 = _area_m2(item)
         if area_m2 > 0 and item.flow is not None and item.flow / area_m2 > FASTEST_M_S:
             yield Said(
                 (*path, "flow"),
                 f"{3600 * item.flow:g} m3/h through {area_m2:g} m2 is {item.flow / area_m2:.3g} m/s; air comes into "
                 f"a room slower than {FASTEST_M_S:g} m/s. Are the unit and the size of the opening right?",
             )
+
+
+def _nothing_left(parts: Parts) -> Iterator[Said]:
+    """Outlets whose flows leave nothing to one without a flow."""
+    outlets, supplies = _named(parts, "outlet"), _named(parts, "supply")
+    flows_m3_s = [item.flow for _, item in outlets if item.flow is not None]
+    supplied_m3_s = sum(
+        item.speed * _area_m2(item) if item.flow is None else item.flow for _, item in supplies
+    )
+    for path, item in outlets if flows_m3_s and supplies else ():
+        if item.flow is None and sum(flows_m3_s) >= supplied_m3_s:
+            yield Said(
+                (*path, "flow"),
+                f"the other outlets take {3600 * sum(flows_m3_s):g} m3/h and the supplies bring "
+                f"{3600 * supplied_m3_s:g} m3/h, so nothing is left for this one. Correct the flows, or give that of "
+                "every outlet.",
+            )
+
+
+def _area_m2(item: OpeningAnswer) -> float:
+    return (item.upper[0] - item.lower[0]) * (item.upper[1] - item.lower[1])
 
 
 def _behind_the_wall(parts: Parts) -> Iterator[Said]:

@@ -117,7 +117,9 @@ def _boundary(scene: Scene, told: SceneReading) -> dict[str, list[dict[str, Any]
             case Inlet():
                 told.unsaid.append(f"A supply on {part.patch.wall} does not blow into the room.")
             case Outlet():
-                found["outlet"].append(_opening(part.patch, told) | _reading(part, part.mean_temperature_k))
+                flow = {} if part.flow_m3_s is None else {"flow": f"{3600 * part.flow_m3_s:.9g} m3/h"}
+                reading = _reading(part, part.mean_temperature_k)
+                found["outlet"].append(_opening(part.patch, told) | flow | reading)
             case Heater():
                 found["surface"].append(_opening(part.patch, told) | _reading(part, part.temperature_k))
             case Wall():

@@ -120,6 +120,7 @@ def _boundary(answers: Answers, room: Box) -> list[BoundaryInformation]:
     outlets = [
         Outlet(
             patch=_patch(item, room),
+            flow_m3_s=item.flow,
             mean_temperature_k=item.temperature,
             temperature_std_k=item.temperature_deviation,
         )

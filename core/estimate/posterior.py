@@ -142,10 +142,8 @@ def doubt_of_velocity(analysis: Analysis, error: ModelError) -> float:
 
 
 def outflow_excess_k(analysis: Analysis) -> float:
-    """Mean over the outlets, by area as the flow divides; 0 in a room without any."""
-    areas = np.array([outlet.area_m2 for outlet in analysis.layout.outlets])
-    share = areas / max(float(areas.sum()), 1e-12)
-    return float(np.dot(share, analysis.best.fields.outflow_excess_k))
+    """Mean over the outlets, weighted with what leaves by each; 0 in a room without any."""
+    return float(np.dot(analysis.layout.outlet_shares, analysis.best.fields.outflow_excess_k))
 
 
 def hydrostatic_m2_s2(

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from core.air import Air
 from core.geometry import WALLS, face_of
-from core.known import refuse_outward, refuse_overlaps, stated_walls
+from core.known import outlet_shares, refuse_outward, refuse_overlaps, stated_walls, supplied_m3_s
 from core.objects import RoomObject
 from core.room.openings import Opening, lay_patch, supply_turbulence
 from core.room.room_grid import AXES, RoomGrid
@@ -20,6 +20,7 @@ from core.room.solids import Solids, SurfaceHeat, lay_objects
 from core.room.wall_planes import Boundary, WallPlane, closed_wall
 from core.scene import Heater, Inlet, OnPatch, Outlet, Scene
 from core.setting import SettingError
+from core.significance import EITHER_WAY
 from core.view_frame import looked_along
 
 
@@ -53,6 +54,7 @@ class RoomParameters(eqx.Module):
 class RoomLayout(eqx.Module):
     """Where openings and heaters are, what is stated about them, and sentences on what the grid cannot hold.
 
+    `outlet_shares`: of the air that leaves, what leaves by each outlet.
     `shown`: whether vertices on a heater get its temperature. `heated`, `no_slip`, `held`: of each wall, 1 if heat
     passes it, if air sticks to it, and if its temperature is stated. `own`: 1 if its vertices show its own
     temperature and not the air's: a stated one, and a fitted one where a camera looks through the wall or at it.
@@ -64,6 +66,7 @@ class RoomLayout(eqx.Module):
     inlet_velocity_m_s: Float[np.ndarray, "inlets 3"]
     inlet_k_epsilon: Float[np.ndarray, "inlets 2"]
     outlets: tuple[Opening, ...]
+    outlet_shares: Float[np.ndarray, " outlets"]
     heaters: tuple[Opening, ...]
     shown: tuple[bool, ...] = eqx.field(static=True)
     heated: Float[np.ndarray, "6"]
@@ -103,7 +106,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
     refuse_overlaps([b for b in scene.boundary if isinstance(b, OnPatch)])
     for inlet in inlets:
         refuse_outward(inlet)
-    notes: list[str] = []
+    notes = _unlike_flows(scene)
     place = [
         [lay_patch(b.patch, scene.room, grid, notes) for b in kind] for kind in (inlets, outlets, heaters)
     ]
@@ -120,6 +123,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
         np.array([i.velocity_m_s for i in inlets], float).reshape(-1, 3),
         np.array([supply_turbulence(i) for i in inlets], float).reshape(-1, 2),
         tuple(place[1]),
+        outlet_shares(scene),
         tuple(place[2]),
         tuple(not isinstance(heater, SuspectedHeater) for heater in heaters),
         heated,
@@ -147,9 +151,8 @@ def boundary(layout: RoomLayout, parameters: RoomParameters) -> Boundary:
     inflow = layout.inflow_m3_s(parameters)
     for n, opening in enumerate(layout.inlets):
         planes[opening.wall] = _with_inlet(planes[opening.wall], layout, n, parameters)
-    area = sum(o.area_m2 for o in layout.outlets)
-    for opening in layout.outlets:
-        speed = inflow.sum() / area
+    for opening, share in zip(layout.outlets, layout.outlet_shares, strict=True):
+        speed = inflow.sum() / opening.area_m2 * float(share)
         fraction = jnp.asarray(opening.fraction, jnp.float32)
         wall = planes[opening.wall]
         planes[opening.wall] = eqx.tree_at(
@@ -196,6 +199,23 @@ def _refuse_covered(kind: str, opening: Opening, solids: Solids | None, grid: Ro
             f"An object covers cells of the {kind} on {WALLS[opening.wall]}, on the grid of "
             f"{' x '.join(map(str, grid.cells))} cells. Move it a little farther from the opening."
         )
+
+
+def _unlike_flows(scene: Scene) -> list[str]:
+    """A sentence where all outlets' flows are stated, and are not what the supplies bring within their deviations."""
+    flows_m3_s = [part.flow_m3_s for part in scene.boundary if isinstance(part, Outlet)]
+    leaving = [flow for flow in flows_m3_s if flow is not None]
+    inlets = [part for part in scene.boundary if isinstance(part, Inlet)]
+    supplied_std = float(np.linalg.norm([i.velocity_std_m_s * i.patch.area_m2 for i in inlets]))
+    supplied = supplied_m3_s(scene)
+    if not leaving or len(leaving) < len(flows_m3_s):
+        return []
+    if abs(sum(leaving) - supplied) <= EITHER_WAY * supplied_std:
+        return []
+    return [
+        f"The outlets' flows are {3600 * sum(leaving):.4g} m3/h in all, and the supplies bring {3600 * supplied:.4g} "
+        "m3/h, give or take less than they differ. The supplies' flow was taken, and the ratio of the outlets'."
+    ]
 
 
 def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlane:

@@ -61,12 +61,14 @@ def computed(
     }
     kelvin = _on_walls(means["T"], scene, centres, "T")[..., 0]
     velocity = _on_walls(means["U"], scene, centres, "u")
-    height_m = np.pad(centres[2], 1, mode="edge")
-    buoyancy = scene.air.expansion_per_k * (kelvin - scene.air.ambient_temperature_k)
-    pressure, nut = (np.pad(means[name][..., 0], 1, mode="edge") for name in ("p_rgh", "nut"))
+    # Pressure passes a wall's surface as it is in the air beside it, whatever the surface's temperature.
+    warmer_k = means["T"][..., 0] - scene.air.ambient_temperature_k
+    hydrostatic = GRAVITY_M_S2 * scene.air.expansion_per_k * warmer_k * centres[2]
+    pressure, nut = (
+        np.pad(of, 1, mode="edge") for of in (means["p_rgh"][..., 0] + hydrostatic, means["nut"][..., 0])
+    )
     kelvin, pressure, velocity, nut = (
-        on_vertices(field, grid, what.vertices)
-        for field in (kelvin, pressure + GRAVITY_M_S2 * height_m * buoyancy, velocity, nut)
+        on_vertices(field, grid, what.vertices) for field in (kelvin, pressure, velocity, nut)
     )
     return arrays_of(what, volume, kelvin, pressure - pressure.mean(), velocity, nut, model), row
 

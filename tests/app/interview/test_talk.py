@@ -174,6 +174,14 @@ def test_an_outlet_on_a_supply_is_asked_for_again_as_a_whole(tmp_path):
     assert answers["outlet"][0]["wall"] == "x_max"
 
 
+def test_of_several_outlets_each_is_asked_for_its_flow(tmp_path):
+    one = "x_max\n1.2\n1.8\n0.1\n0.3\n"
+    two = f"2\n{one}none\nnone\nz_max\n1\n1.4\n1\n1.4\n60\nnone\n"
+    answers, script = answered(tmp_path / "lab", changed(f"1\n{one}none\n", two))
+    assert script.refused == []
+    assert [item.get("flow") for item in answers["outlet"]] == [None, "60 m3/h"]
+
+
 # In place of "no objects": a ready one, and a box of its own size and heat.
 NO_OBJECTS, OBJECTS = "none\n0\n0\n0\n", "none\n0\n0\n{}"
 SECOND = """\

@@ -69,6 +69,18 @@ def test_what_was_entered_is_given_back_as_it_was_written_and_reads_back_to_the_
     assert scene_back(open_experiment(again.folder).settings).answers == scene_back(made.settings).answers
 
 
+def test_flows_of_outlets_are_read_back(tmp_path):
+    other = (
+        '[[outlet]]\nwall = "z_max"\nlower = ["1 m", "1 m"]\nupper = ["1.4 m", "1.4 m"]\nflow = "50 m3/h"\n'
+    )
+    made = new_experiment(tmp_path / "lab", template("wall-jet") + other, "answers")
+    (made.folder / ANSWERS_FILE).unlink()
+
+    read = answers_of(made).answers["outlet"]
+
+    assert [item.get("flow") for item in read] == [None, "50 m3/h"]
+
+
 def _truth(told) -> str:
     return told.answers["camera"].get("truth", "")
 

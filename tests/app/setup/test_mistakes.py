@@ -17,6 +17,7 @@ from app.setup.mistakes import mistakes_in
 
 GONE = object()
 BESIDE = [{"wall": "x_min", "lower": ["1.5 m", "2.4 m"], "upper": ["2 m", "2.6 m"], "temperature": "40 C"}]
+OUTLET = {"wall": "x_max", "lower": ["1.2 m", "0.1 m"], "upper": ["1.8 m", "0.3 m"]}
 PERSON = {"kind": "seated_person", "position": ["2 m", "1 m", "0 m"]}
 METER = {"position": ["2 m", "1 m", "1 m"], "velocity": ["0.1 m/s", "0 m/s", "0 m/s"]}
 PROJECTOR = {
@@ -95,6 +96,12 @@ WRONG: list[tuple[Keys, Any, str, str]] = [
     # What contradicts itself.
     (("outlet",), GONE, "supply", r"1 supplies and 0 outlets: air that comes in must leave"),
     (("supply",), GONE, "outlet", r"0 supplies and 1 outlets"),
+    (
+        ("outlet",),
+        [OUTLET | {"flow": "120 m3/h"}, OUTLET | {"wall": "x_min"}],
+        "outlet[1].flow",
+        r"the other outlets take 120 m3/h and the supplies bring 120 m3/h, so nothing is left for this one",
+    ),
     (("supply", 0, "speed"), "1 m/s", "supply[0]", r"give flow or speed, and not both"),
     (("supply", 0, "flow"), GONE, "supply[0]", r"give flow or speed"),
     (("camera", "distance"), GONE, "camera", r"give distance .* or position"),

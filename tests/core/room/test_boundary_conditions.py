@@ -29,6 +29,7 @@ SUPPLY = Inlet(
     velocity_m_s=(0.5, 0.0, 0.1),
 )
 EXHAUST = Outlet(patch=Patch(wall="z_min", lower_m=(3.0, 1.0), upper_m=(3.5, 2.0)))
+HIGH = Outlet(patch=Patch(wall="x_max", lower_m=(1.0, 2.0), upper_m=(2.0, 2.2)))
 FLOOR = Heater(patch=Patch(wall="z_min", lower_m=(1.0, 1.0), upper_m=(2.0, 2.0)), temperature_k=313.15)
 
 
@@ -63,6 +64,46 @@ def test_openings_keep_their_flow_and_momentum_on_any_grid():
         # Through the faces, and as a force on the first cells: together U^2 A.
         momentum = float((low.normal_m_s**2).sum()) * area + float(low.force_m_s2.sum()) * grid.volume_m3
         assert momentum == pytest.approx(0.25 * patch_m2, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("low_m3_s", "high_m3_s", "low_share"),
+    # The supply brings 0.0999 m3/s; the outlets' areas are 0.5 and 0.2 m2.
+    [(None, None, 5 / 7), (0.0333, None, 1 / 3), (None, 0.0333, 2 / 3), (0.3, 0.1, 3 / 4)],
+)
+def test_outlets_share_what_leaves_as_their_flows_are_stated(low_m3_s, high_m3_s, low_share):
+    outlets = (
+        dataclasses.replace(one, flow_m3_s=flow)
+        for one, flow in zip((EXHAUST, HIGH), (low_m3_s, high_m3_s), strict=True)
+    )
+    grid = room_grid(ROOM, 9)
+    layout = room_layout(scene(SUPPLY, *outlets), grid)
+    walls = boundary(layout, parameters(1, 0)).walls
+
+    through_m3_s = [
+        float(jnp.sum(walls[axis][end].normal_m_s)) * grid.face_area_m2(axis)
+        for axis, end in ((2, 0), (0, 1))
+    ]
+    supplied_m3_s = 0.5 * 0.74 * 0.27
+    assert -through_m3_s[0] == pytest.approx(low_share * supplied_m3_s, rel=1e-5)
+    assert through_m3_s[1] == pytest.approx((1 - low_share) * supplied_m3_s, rel=1e-5)
+
+
+def test_flows_of_outlets_that_are_not_what_the_supplies_bring_are_told():
+    low, high = (dataclasses.replace(one, flow_m3_s=0.05) for one in (EXHAUST, HIGH))
+    grid = room_grid(ROOM, 9)
+    told = room_layout(scene(SUPPLY, low, dataclasses.replace(high, flow_m3_s=0.1)), grid).notes
+    assert any("540 m3/h in all, and the supplies bring 359.6 m3/h" in note for note in told)
+    for outlets in ((low, high), (low, HIGH)):
+        assert not any("in all" in note for note in room_layout(scene(SUPPLY, *outlets), grid).notes)
+
+
+def test_an_outlet_to_which_the_others_leave_nothing_is_refused():
+    low = dataclasses.replace(EXHAUST, flow_m3_s=0.1)
+    with pytest.raises(SettingError, match=r"360 m3/h in all and the supplies bring 359\.6 m3/h"):
+        room_layout(scene(SUPPLY, low, HIGH), room_grid(ROOM, 9))
+    with pytest.raises(SettingError, match="above 0 and below 100 m3/s"):
+        dataclasses.replace(EXHAUST, flow_m3_s=0.0)
 
 
 def test_a_faster_supply_brings_turbulence_as_its_speed_says():
