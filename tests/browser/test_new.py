@@ -166,6 +166,21 @@ def test_pictures_of_another_camera_are_brought_and_what_is_printed_is_a_pdf(
     expect(page.get_by_role("alert")).to_contain_text("The flow pictures have 64 x 48 px")
 
 
+def test_of_several_outlets_each_may_have_its_flow(station: Station, opens: Opens):
+    page = opens(station.address).page
+    page.get_by_role("button", name="New experiment").click()
+    page.get_by_role("radio", name=re.compile("packaged room")).check()
+    flows = page.get_by_label("Flow (empty: by area)")
+    expect(page.get_by_role("group", name="outlet 1").first).to_be_visible()
+    expect(flows).to_have_count(0)
+    page.get_by_role("button", name="Add outlet").click()
+    expect(flows).to_have_count(2)
+    flows.first.fill("9000 m3/h")
+    expect(page.locator("main")).to_contain_text("so nothing is left for this one")
+    flows.first.fill("50 m3/h")
+    expect(page.locator("main")).not_to_contain_text("so nothing is left for this one")
+
+
 def test_the_large_board_of_a_simulated_rig_is_printed_over_sheets(station: Station, opens: Opens):
     page = opens(station.address).page
     page.locator("button.next", has_text="Start a simulated rig").click()
