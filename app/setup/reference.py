@@ -57,6 +57,9 @@ file = "boundary/plane_x_min.npz"
 [[scene.boundary]]
 kind = "inlet"
 length_scale_m = 0.02
+[[scene.boundary]]
+kind = "outlet"
+flow_m3_s = 0.0167
 [[scene.objects]]
 name = "person"
 lower_m = [1.8, 1.3, 0.0]
@@ -116,6 +119,8 @@ url = "pjlink://192.168.0.21"
 pattern_seed = 2
 [[supply]]
 speed = "0.28 m/s"
+[[outlet]]
+flow = "60 m3/h"
 [[wall]]
 wall = "z_min"
 adiabatic = true
@@ -136,6 +141,7 @@ velocity = ["0.1 m/s", "0 m/s", "0 m/s"]
 _ENDINGS = {
     "_kg_m3": "kg/m3",
     "_m2_s2": "m2/s2",
+    "_m3_s": "m3/s",
     "_m2_s": "m2/s",
     "_m_s": "m/s",
     "_rad": "rad",

@@ -213,8 +213,9 @@ def _unlike_flows(scene: Scene) -> list[str]:
     if abs(sum(leaving) - supplied) <= EITHER_WAY * supplied_std:
         return []
     return [
-        f"The outlets' flows are {3600 * sum(leaving):.4g} m3/h in all, and the supplies bring {3600 * supplied:.4g} "
-        "m3/h, give or take less than they differ. The supplies' flow was taken, and the ratio of the outlets'."
+        f"The outlets' flows are {3600 * sum(leaving):.4g} m3/h in all, but the supplies bring {3600 * supplied:.4g} "
+        "m3/h, and their deviations do not hold the difference. The supplies' flow was taken, shared as the outlets' "
+        "flows are. Check them."
     ]
 
 

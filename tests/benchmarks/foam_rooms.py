@@ -92,6 +92,7 @@ def on_faces(what: Made, grid: RoomGrid) -> Made:
 
 def _nearest(span_m: list[float], faces_m: np.ndarray) -> list[float]:
     first, last = (int(np.argmin(np.abs(faces_m - edge))) for edge in span_m)
+    first = min(first, len(faces_m) - 2)
     return [round(float(faces_m[n]), 6) for n in (first, max(last, first + 1))]
 
 

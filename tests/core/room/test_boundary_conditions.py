@@ -93,7 +93,7 @@ def test_flows_of_outlets_that_are_not_what_the_supplies_bring_are_told():
     low, high = (dataclasses.replace(one, flow_m3_s=0.05) for one in (EXHAUST, HIGH))
     grid = room_grid(ROOM, 9)
     told = room_layout(scene(SUPPLY, low, dataclasses.replace(high, flow_m3_s=0.1)), grid).notes
-    assert any("540 m3/h in all, and the supplies bring 359.6 m3/h" in note for note in told)
+    assert any("540 m3/h in all, but the supplies bring 359.6 m3/h" in note for note in told)
     for outlets in ((low, high), (low, HIGH)):
         assert not any("in all" in note for note in room_layout(scene(SUPPLY, *outlets), grid).notes)
 
