@@ -78,6 +78,11 @@ class Face:
         """Sign of a velocity along its axis that enters the room."""
         return -1.0 if self.upper else 1.0
 
+    def straight_in(self, speed: float) -> Vector3:
+        """The velocity of this speed that enters the room at right angles."""
+        x, y, z = (self.inward * speed if axis == self.axis else 0.0 for axis in range(3))
+        return x, y, z
+
     @property
     def along(self) -> tuple[int, int]:
         """The two axes of the wall, in the order x, y, z."""

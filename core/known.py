@@ -57,15 +57,8 @@ def measured_outlets(scene: Scene) -> list[tuple[int, Outlet, float]]:
 
 def supplied_m3_s(scene: Scene) -> float:
     """Volume flow of all supplies, as stated."""
-    return sum(
-        (
-            face.inward * inlet.velocity_m_s[face.axis] * inlet.patch.area_m2
-            for inlet in scene.boundary
-            if isinstance(inlet, Inlet)
-            for face in [face_of(inlet.patch.wall)]
-        ),
-        start=0.0,
-    )
+    inlets = [part for part in scene.boundary if isinstance(part, Inlet)]
+    return float(sum(inlet.inward_m_s * inlet.patch.area_m2 for inlet in inlets))
 
 
 def outlet_shares(scene: Scene) -> Float[np.ndarray, " outlets"]:
@@ -135,7 +128,7 @@ def refuse_overlaps(parts: Sequence[OnPatch]) -> None:
 def refuse_outward(inlet: Inlet) -> None:
     """Raise SettingError if the supply does not point into the room."""
     face = face_of(inlet.patch.wall)
-    if face.inward * inlet.velocity_m_s[face.axis] <= 0:
+    if inlet.inward_m_s <= 0:
         raise SettingError(
             f"The inlet on {inlet.patch.wall} supplies air at {inlet.velocity_m_s} m/s, which does not "
             f"enter the room. Give a velocity with {'xyz'[face.axis]} {'> 0' if face.inward > 0 else '< 0'}, "

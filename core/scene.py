@@ -261,6 +261,12 @@ class Inlet:
     length_scale_m: float | None = None
     """Mixing length; without it, 0.07 of the hydraulic diameter."""
 
+    @property
+    def inward_m_s(self) -> float:
+        """The part of its velocity straight off its wall, into the room."""
+        face = face_of(self.patch.wall)
+        return face.inward * self.velocity_m_s[face.axis]
+
     def __post_init__(self) -> None:
         check_kelvin("The inlet's temperature", self.temperature_k)
         _check_std("The inlet's temperature_std_k", self.temperature_std_k, "K")

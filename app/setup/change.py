@@ -11,7 +11,6 @@ from app.experiment.folder import ExperimentSettings
 from app.setup.answers import Answers
 from app.setup.change_views import changed_rig, changed_views
 from app.setup.merge import merged, merged_list, sources
-from app.setup.readback import blows_in
 from core.objects import RoomObject
 from core.scene import BoundaryInformation, Heater, Inlet, Outlet, PointSensors, Scene, View, Wall
 
@@ -77,7 +76,7 @@ def _asked(scene: Scene) -> list[BoundaryInformation]:
     return [
         one
         for one in scene.boundary
-        if isinstance(one, Outlet | Heater) or (isinstance(one, Inlet) and blows_in(one) > 0)
+        if isinstance(one, Outlet | Heater) or (isinstance(one, Inlet) and one.inward_m_s > 0)
     ]
 
 

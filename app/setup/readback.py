@@ -98,12 +98,6 @@ def answer_of(box: RoomObject, corner_m: Vector3) -> dict[str, Any]:
     return _object(box, SceneReading(corner_m))
 
 
-def blows_in(inlet: Inlet) -> float:
-    """The part of an inlet's velocity straight off its wall [m/s]."""
-    face = face_of(inlet.patch.wall)
-    return face.inward * inlet.velocity_m_s[face.axis]
-
-
 def _kelvin(value_k: float) -> str:
     return f"{max(value_k, _LEAST_STD):.9g} K"
 
@@ -112,7 +106,7 @@ def _boundary(scene: Scene, told: SceneReading) -> dict[str, list[dict[str, Any]
     found: dict[str, list[dict[str, Any]]] = {"supply": [], "outlet": [], "surface": [], "wall": []}
     for part in scene.boundary:
         match part:
-            case Inlet() if blows_in(part) > 0:
+            case Inlet() if part.inward_m_s > 0:
                 found["supply"].append(_supply(part, len(found["supply"]) + 1, told))
             case Inlet():
                 told.unsaid.append(f"A supply on {part.patch.wall} does not blow into the room.")
@@ -132,7 +126,7 @@ def _boundary(scene: Scene, told: SceneReading) -> dict[str, list[dict[str, Any]
 
 
 def _supply(inlet: Inlet, number: int, told: SceneReading) -> dict[str, Any]:
-    speed_m_s = blows_in(inlet)
+    speed_m_s = inlet.inward_m_s
     if abs(speed_m_s - math.hypot(*inlet.velocity_m_s)) > 1e-6 * speed_m_s:
         told.unsaid.append(
             f"Supply {number} blows at an angle to its wall. Its speed here is the part straight off the wall; the "

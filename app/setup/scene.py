@@ -172,15 +172,12 @@ def object_of(item: ObjectAnswer, number: int, corner_m: Vector3 = (0.0, 0.0, 0.
 
 def _inlet(item: SupplyAnswer, room: Box) -> Inlet:
     patch = _patch(item, room)
-    face = face_of(item.wall)
     speed_m_s = (item.speed or 0.0) if item.flow is None else item.flow / patch.area_m2
-    velocity = [0.0, 0.0, 0.0]
-    velocity[face.axis] = face.inward * speed_m_s
     return Inlet(
         patch=patch,
         temperature_k=item.temperature,
         temperature_std_k=item.temperature_deviation,
-        velocity_m_s=(velocity[0], velocity[1], velocity[2]),
+        velocity_m_s=face_of(item.wall).straight_in(speed_m_s),
         velocity_std_m_s=item.deviation * speed_m_s,
     )
 

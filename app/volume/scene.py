@@ -299,13 +299,10 @@ def projected(camera: Optics, projector: Optics, seed: int) -> ProjectedPattern:
 
 def _inlet(inlet: dict[str, Any], volume: RoomVolume) -> Inlet:
     patch = _patch(inlet)
-    face = face_of(patch.wall)
-    inward_m_s = face.inward * float(inlet["U"])
-    x, y, z = (inward_m_s if axis == face.axis else 0.0 for axis in range(3))
     return Inlet(
         patch=patch,
         temperature_k=volume.ambient_k + float(inlet["dT"]),
-        velocity_m_s=(x, y, z),
+        velocity_m_s=face_of(patch.wall).straight_in(float(inlet["U"])),
         turbulence_intensity=float(volume.case.get("TI", 0.1)),
         length_scale_m=_length_scale_m(inlet, volume),
     )

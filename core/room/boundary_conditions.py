@@ -54,10 +54,10 @@ class RoomParameters(eqx.Module):
 class RoomLayout(eqx.Module):
     """Where openings and heaters are, what is stated about them, and sentences on what the grid cannot hold.
 
-    `outlet_shares`: of the air that leaves, what leaves by each outlet.
-    `shown`: whether vertices on a heater get its temperature. `heated`, `no_slip`, `held`: of each wall, 1 if heat
-    passes it, if air sticks to it, and if its temperature is stated. `own`: 1 if its vertices show its own
-    temperature and not the air's: a stated one, and a fitted one where a camera looks through the wall or at it.
+    `outlet_shares`: of the air that leaves, the share that leaves by each outlet. `shown`: whether vertices on a
+    heater get its temperature. `heated`, `no_slip`, `held`: of each wall, 1 if heat passes it, if air sticks to it,
+    and if its temperature is stated. `own`: 1 if its vertices show its own temperature and not the air's: a stated
+    one, and a fitted one where a camera looks through the wall or at it.
     `solids` are the objects in the room, and `objects` those of the scene; None and empty where there are none.
     """
 

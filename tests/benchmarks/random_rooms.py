@@ -43,7 +43,7 @@ _SEED = 2611
 _NAMES = ("xMinWall", "xMaxWall", "front", "back", "floor", "ceiling")
 # From this number on, openings stand on any wall but the patterned one and the floor.
 _ON_ANY_WALL = 100
-# Each wall's axis, and the two along it; the ceiling twice, for it holds most supplies.
+# Each wall, and its axes in the order of an opening's longer and shorter side; the ceiling twice, for it holds most.
 _OPEN = (("xMinWall", "yz"), ("xMaxWall", "yz"), ("front", "xz"), ("ceiling", "xy"), ("ceiling", "yx"))
 # Between two openings, and between an opening and the wall's edge.
 _MARGIN_M = 0.1
@@ -54,10 +54,11 @@ def drawn(number: int) -> Made:
     draw = np.random.default_rng([_SEED, number])
     size = np.round([draw.uniform(2.4, 8.0), draw.uniform(2.4, 8.0), draw.uniform(2.4, 3.6)], 1)
     domain = (0.0, float(size[0]), -float(size[1]) / 2, float(size[1]) / 2, 0.0, float(size[2]))
-    openings, outlets = _openings(draw, int(draw.integers(2, 5)), domain), 1
+    supplies, outlets = int(draw.integers(1, 4)), 1
+    openings = _openings(draw, supplies + outlets, domain)
     if number >= _ON_ANY_WALL:
         outlets = int(draw.integers(1, 3))
-        openings = _openings_anywhere(draw, len(openings) - 1 + outlets, domain)
+        openings = _openings_anywhere(draw, supplies + outlets, domain)
     inlets = tuple(
         {
             **place,
