@@ -22,7 +22,7 @@ from core.geometry import face_of
 from core.known import stated_walls
 from core.room.forward import room
 from core.room.room_grid import RoomGrid
-from core.scene import Heater, Inlet, Outlet, Scene
+from core.scene import Heater, Inlet, Outlet, Patch, Scene
 from tests.benchmarks.other_rooms import Made, arrays_of, empty, on_vertices
 
 MODELS: tuple[Turbulence, ...] = ("kEpsilon", "RNGkEpsilon", "kOmegaSST")
@@ -57,6 +57,7 @@ def computed(
         "cells": list(grid.cells),
         "change_k": float(np.sqrt(np.mean((means["T"] - half["T"]) ** 2))),
         "change_u": float(np.sqrt(np.mean((means["U"] - half["U"]) ** 2) / np.mean(means["U"] ** 2))),
+        "outlets_m3_s": leaving_m3_s(means["U"], scene, grid),
         "cpu_s": spent_s,
     }
     kelvin = _on_walls(means["T"], scene, centres, "T")[..., 0]
@@ -71,6 +72,19 @@ def computed(
         on_vertices(field, grid, what.vertices) for field in (kelvin, pressure, velocity, nut)
     )
     return arrays_of(what, volume, kelvin, pressure - pressure.mean(), velocity, nut, model), row
+
+
+def leaving_m3_s(velocity_m_s: np.ndarray, scene: Scene, grid: RoomGrid) -> list[float]:
+    """What leaves by each outlet, from the air beside it; all of it is what the supplies bring."""
+    leaving = []
+    for part in scene.boundary:
+        if isinstance(part, Outlet):
+            face = face_of(part.patch.wall)
+            outward = -face.inward * np.take(velocity_m_s[..., face.axis], face.end, axis=face.axis)
+            centres_m = tuple(grid.centres_m(axis) for axis in range(3))
+            leaving.append(float(outward[_covered(part.patch, centres_m)].mean() * part.patch.area_m2))
+    brought = sum(part.patch.area_m2 * part.inward_m_s for part in scene.boundary if isinstance(part, Inlet))
+    return [flow * brought / sum(leaving) for flow in leaving]
 
 
 def on_faces(what: Made, grid: RoomGrid) -> Made:
@@ -96,6 +110,16 @@ def _nearest(span_m: list[float], faces_m: np.ndarray) -> list[float]:
     return [round(float(faces_m[n]), 6) for n in (first, max(last, first + 1))]
 
 
+def _covered(patch: Patch, centres_m: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+    """Places of a patch's faces on its wall, as an index."""
+    return np.ix_(
+        *(
+            np.flatnonzero((centres_m[axis] > low) & (centres_m[axis] < high))
+            for axis, low, high in zip(face_of(patch.wall).along, patch.lower_m, patch.upper_m, strict=True)
+        )
+    )
+
+
 def _on_walls(
     cells: np.ndarray, scene: Scene, centres_m: tuple[np.ndarray, ...], kind: Literal["T", "u"]
 ) -> np.ndarray:
@@ -115,12 +139,7 @@ def _on_walls(
         face = face_of(part.patch.wall)
         planes = np.moveaxis(wide, face.axis, 0)
         on_wall, beside = (planes[0], planes[1]) if face.end == 0 else (planes[-1], planes[-2])
-        covered = np.ix_(
-            *(
-                1 + np.flatnonzero((centres_m[axis] > low) & (centres_m[axis] < high))
-                for axis, low, high in zip(face.along, part.patch.lower_m, part.patch.upper_m, strict=True)
-            )
-        )
+        covered = tuple(1 + places for places in _covered(part.patch, centres_m))
         if isinstance(part, Outlet):
             on_wall[covered] = beside[covered]
         elif kind == "T":

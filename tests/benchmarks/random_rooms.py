@@ -22,6 +22,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
 from app.bench.room_fit import fit_row, problem_of
@@ -34,7 +36,9 @@ from core.geometry import WallName
 from core.metrics import inner, off_walls, rms
 from core.problem import Problem
 from core.room.forward import room, room_fields
+from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.room.march import MarchSettings, march
+from core.scene import Outlet
 from core.solve.room import RoomSettings
 from tests.benchmarks.foam_rooms import MODELS, computed
 from tests.benchmarks.other_rooms import T0_K, Made, marched
@@ -182,6 +186,7 @@ def row_of(
 def stated_row(folder: Path, number: int, cells: int, by: str) -> dict[str, Any]:
     """How far off a march is with everything stated as it is, under either closure, and nothing fitted.
 
+    What OpenFOAM's outlets take is stated too, and its heaters give off heat by the wall function, as its walls do.
     What is left is the closure's, the grid's, and the truth's own, which may still move (`truth_moves`: how far the
     mean over its first half is from the mean over all, over its rms).
     """
@@ -189,9 +194,20 @@ def stated_row(folder: Path, number: int, cells: int, by: str) -> dict[str, Any]
     volume, truth = read_volume(path), json.loads(path.with_suffix(".json").read_text())
     row = {"room": number, "truth": truth["closure"], "cells": cells, "truth_moves": truth.get("change_u")}
     scene = room_scene(volume, RigOptions(), "surveyed")
+    if by == "openfoam":
+        flows = iter(truth["outlets_m3_s"])
+        parts = (
+            replace(part, flow_m3_s=next(flows)) if isinstance(part, Outlet) else part
+            for part in scene.boundary
+        )
+        scene = replace(scene, boundary=tuple(parts))
     for closure in ("k_epsilon", "zero_equation"):
         forward = room(scene, cells, closure)
-        model = forward.model(room_prior(Problem(scene, (), ()), forward.layout).mean)
+        stated = room_prior(Problem(scene, (), ()), forward.layout).mean
+        if by == "openfoam":
+            by_wall_function = jnp.full_like(stated.heater_log_heat, np.log(NOMINAL_HEAT_M_S))
+            stated = eqx.tree_at(lambda p: p.heater_log_heat, stated, by_wall_function)
+        model = forward.model(stated)
         excess_k = 0.5 * float(np.mean([inlet["dT"] for inlet in what.inlets]))
         rest = forward.at_rest(model, np.full(forward.grid.cells[2], excess_k))
         found = march(rest, model, MarchSettings(longest_s=what.settle_s))

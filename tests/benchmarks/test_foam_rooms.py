@@ -10,7 +10,7 @@ from core.geometry import face_of
 from core.room.forward import room
 from core.room.room_grid import RoomGrid
 from core.scene import Heater, Inlet, Outlet
-from tests.benchmarks.foam_rooms import on_faces
+from tests.benchmarks.foam_rooms import leaving_m3_s, on_faces
 from tests.benchmarks.other_rooms import Made, empty
 from tests.benchmarks.random_rooms import drawn
 
@@ -49,3 +49,18 @@ def test_a_slot_narrower_than_a_cell_becomes_one_cell_wide():
     (inlet,) = on_faces(replace(what, inlets=(slot,)), grid).inlets
 
     assert np.ptp(inlet["y"]) == pytest.approx(grid.spacing_m[1], rel=1e-4)
+
+
+def test_outlets_take_what_the_supplies_bring_each_by_the_air_beside_it():
+    what = on_faces(drawn(103), grid_of(drawn(103)))
+    grid, scene = grid_of(what), room_scene(empty("room", what), RigOptions(), "surveyed")
+    on_x_min, on_ceiling = (part for part in scene.boundary if isinstance(part, Outlet))
+    velocity = np.zeros((*grid.cells, 3))
+    # Out by both: twice as fast through the ceiling.
+    velocity[0, ..., 0], velocity[..., -1, 2] = -1.0, 2.0
+
+    taken = leaving_m3_s(velocity, scene, grid)
+
+    brought = sum(p.inward_m_s * p.patch.area_m2 for p in scene.boundary if isinstance(p, Inlet))
+    assert sum(taken) == pytest.approx(brought)
+    assert taken[1] / taken[0] == pytest.approx(2.0 * on_ceiling.patch.area_m2 / on_x_min.patch.area_m2)
