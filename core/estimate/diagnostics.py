@@ -215,10 +215,13 @@ def balances(
     outflow_excess_k: float,
     problem: Problem,
     warmer_k: float = 0.0,
+    warmer_std_k: float = 0.0,
 ) -> list[str]:
     """The room's heat balance in words, and a warning if heat is missing.
 
-    `warmer_k` is how much warmer thermometers say that the air is than the room of these parameters.
+    `warmer_k` is how much warmer thermometers say that the air is than the room of these parameters, `warmer_std_k`
+    its standard deviation, which holds how far outlets may be from the air beside them. Heat is missing if it is more
+    than a tenth of what supplies and objects bring, and more than these deviations give in one room of twenty.
     """
     inflow_m3_s = float(inflows_m3_s.sum())
     if inflow_m3_s <= 0:
@@ -234,11 +237,13 @@ def balances(
         "through."
     ]
     missing = capacity_w_m3_k * inflow_m3_s * warmer_k
-    if abs(missing) > _MISSING_SHARE * (abs(brought) + abs(by_objects)):
+    much = abs(missing) > _MISSING_SHARE * (abs(brought) + abs(by_objects))
+    if much and abs(warmer_k) > EITHER_WAY * warmer_std_k:
         said.append(
             f"The air is measured {abs(warmer_k):.2g} K {'warmer' if warmer_k > 0 else 'colder'} than the fitted "
-            f"room: {abs(missing):.0f} W {'more' if missing > 0 else 'less'} leave with it than supply, heaters and "
-            "walls give it. A source, a leak or a wall is not as stated."
+            f"room (95 %: +- {EITHER_WAY * warmer_std_k:.2g} K): {abs(missing):.0f} W "
+            f"{'more' if missing > 0 else 'less'} leave with it than supply, heaters and walls give it. A source, a "
+            "leak or a wall is not as stated."
         )
     return said
 

@@ -47,13 +47,15 @@ _LAYER_SHARE = 1.0
 class Correction(eqx.Module):
     """The correction on vertices, and its prior and posterior variance; all constant along y.
 
-    `point_k2` is the variance of one point about the mean along y.
+    `point_k2` is the variance of one point about the mean along y. `level_std_k` is the posterior deviation of the
+    mean over the room.
     """
 
     excess_k: Float[np.ndarray, "vx vz"]
     prior_variance_k2: Float[np.ndarray, "vx vz"]
     variance_k2: Float[np.ndarray, "vx vz"]
     point_k2: float
+    level_std_k: float
 
 
 class _Residuals(eqx.Module):
@@ -115,7 +117,11 @@ def temperature_correction(
         np.einsum("ixz,ixz->xz", basis, np.tensordot(c[:size, :size], basis, axes=1))
         for c in (prior, fitted.covariance)
     )
-    return Correction(np.tensordot(fitted.mean[:size], basis, axes=1), before, after, _point_k2(std_k))
+    level = basis.mean((1, 2))
+    level_std_k = float(np.sqrt(level @ fitted.covariance[:size, :size] @ level))
+    return Correction(
+        np.tensordot(fitted.mean[:size], basis, axes=1), before, after, _point_k2(std_k), level_std_k
+    )
 
 
 def _kinds(

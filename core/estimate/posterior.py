@@ -100,15 +100,17 @@ def solution(
         temperature.informed,
         outcome=analysis.best.flow.outcome,
         solver_s=seconds,
-        notes=(*notes, *sentences(analysis, error, doubt, moved_k)),
+        notes=(*notes, *sentences(analysis, error, doubt, moved_k, change.level_std_k)),
     )
 
 
-def sentences(analysis: Analysis, error: ModelError, doubt: float, moved_k: float) -> list[str]:
+def sentences(
+    analysis: Analysis, error: ModelError, doubt: float, moved_k: float, level_std_k: float
+) -> list[str]:
     """Sentences for the operator.
 
     `doubt` is the expected error of the velocity over its size, both rms; `moved_k` how far measurements moved the
-    level of T.
+    level of T, and `level_std_k` how well they know it.
     """
     parameters = analysis.best.parameters
     inflow = np.asarray(analysis.layout.inflow_m3_s(parameters), float)
@@ -120,7 +122,7 @@ def sentences(analysis: Analysis, error: ModelError, doubt: float, moved_k: floa
         *misfit(analysis.data, explained(analysis.data, analysis.best.fields), error),
         *doubtful(doubt),
         *other_way(likeness(analysis.data, analysis.stated_room)),
-        *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, moved_k),
+        *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, moved_k, level_std_k),
     ]
 
 

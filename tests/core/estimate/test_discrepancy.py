@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from core.estimate.discrepancy import Correction, temperature_correction
 from core.estimate.observation import Observations, observations
@@ -70,6 +71,8 @@ def test_an_outlet_that_may_draw_from_elsewhere_says_less_of_the_level():
     assert elsewhere.excess_k.mean() < 0.4 * near.excess_k.mean()
     # An outlet's 0.6 K beside a level known to 0.3 K: 0.27 K are left.
     np.testing.assert_allclose(np.sqrt(elsewhere.variance_k2), 0.27, atol=0.03)
+    assert elsewhere.level_std_k == pytest.approx(0.27, abs=0.03)
+    assert near.level_std_k < 0.1
 
 
 def test_a_plane_says_less_of_the_level_where_its_walls_layer_is_unknown():

@@ -105,13 +105,18 @@ def test_the_surface_of_a_stated_wall_may_be_off_by_its_stated_deviation():
     assert not std_k[1:].any()
 
 
-@pytest.mark.parametrize(("warmer_k", "said"), [(3.0, "W more"), (-3.0, "W less"), (0.2, None)])
-def test_heat_that_the_measured_level_asks_for_is_said_where_it_matters(warmer_k: float, said: str | None):
+@pytest.mark.parametrize(
+    ("warmer_k", "std_k", "said"),
+    [(3.0, 1.0, "W more"), (-3.0, 1.0, "W less"), (0.2, 0.05, None), (3.0, 2.0, None)],
+)
+def test_heat_that_the_measured_level_asks_for_is_said_where_it_matters_and_is_no_chance(
+    warmer_k: float, std_k: float, said: str | None
+):
     given = problem(stated=True)
     parameters = prior_of(given).mean
     parameters = eqx.tree_at(lambda p: p.inlet_excess_k, parameters, jnp.array([10.0]))
 
-    # Of 10 K that come in, a tenth is what counts.
-    sentences = balances(parameters, np.array([0.1]), 8.0, given, warmer_k)
+    # Of 10 K that come in, a tenth is what counts; and no more than twice the deviation may be chance.
+    sentences = balances(parameters, np.array([0.1]), 8.0, given, warmer_k, std_k)
 
     assert [said in s for s in sentences[1:]] == ([True] if said else [])
