@@ -7,7 +7,7 @@ a heat source, more than half, or than models of the air differ in (`core.estima
 import numpy as np
 from scipy.stats import chi2
 
-from core.estimate.diagnostics import missing
+from core.estimate.diagnostics import missing, moved_too_far
 from core.estimate.explained import explained
 from core.estimate.forward_runs import RoomSettings, other_closure
 from core.estimate.marches import Marches
@@ -38,21 +38,24 @@ def suspected_heat(
 ) -> Suspect | None:
     """The panel of floor whose heat may be missing; None where nothing is, or no panel would explain anything.
 
-    It is looked for only where walls are unknown and the fitted room lacks something.
+    It is looked for where the fitted room lacks something, and where the fit moved an entry or the viscosity too far:
+    an entry is not accused before a source that nobody stated has been tried in its place.
     """
-    if not settings.use_images or not background.prior.unknown_walls() or not lacks_something(analysis):
+    moves = model_error_of(analysis).moves
+    strange = lacks_something(analysis) or moved_too_far(analysis.prior, analysis.posterior, moves)
+    if not settings.use_images or not strange:
         return None
     return likeliest(background, analysis.data, settings, marches)
 
 
-def explains_more(warm: Analysis, without: Analysis) -> bool:
-    """Whether the room with suspected heat explains more of the images than chance would, which passes once in 20.
+def explains_more(one: Analysis, other: Analysis) -> bool:
+    """Whether, of a room with suspected heat and one without, `one` explains more than chance would, once in 20.
 
     Twice the logarithm of the likelihoods' ratio, of the images' data that err by themselves, has a chi-square
     distribution (Wilks 1938). Its degrees of freedom are the heat of the panel and of its neighbours.
     """
-    gained = 2.0 * independent(without.data) * np.log(left_over(without) / left_over(warm))
-    panels = 1 + 2 * len(told_on_floor(without.problem.scene))
+    gained = 2.0 * independent(other.data) * np.log(left_over(other) / left_over(one))
+    panels = 1 + 2 * len(told_on_floor(other.problem.scene))
     return bool(gained > chi2.ppf(1.0 - FALSE_ALARMS, panels))
 
 

@@ -30,6 +30,20 @@ _WIDE = 2.0
 _SUSPICIOUS_K = 8.0
 
 
+def moved_too_far(
+    prior: Prior, posterior: Posterior, by_model: Float[np.ndarray, " active"]
+) -> dict[str, float]:
+    """Parameters that the fit moved further than entries and model may be wrong, and how many times that.
+
+    `by_model` is how far what the model has wrong moves each parameter, one standard deviation, in prior deviations.
+    Where entries are as right as stated and the model as wrong as that, one room in twenty has any.
+    """
+    doubt = np.sqrt(1.0 + by_model**2)
+    limit = float(ndtri(1.0 - FALSE_ALARMS / (2.0 * max(len(doubt), 1))))
+    times = zip(prior.names(), np.abs(posterior.vector) / doubt, strict=True)
+    return {name: float(n) for name, n in times if n > limit}
+
+
 def contradictions(
     problem: Problem,
     prior: Prior,
@@ -37,17 +51,12 @@ def contradictions(
     by_model: Float[np.ndarray, " active"],
     doubt_of_velocity: float = 0.0,
 ) -> list[str]:
-    """One sentence for each entered value that the measurements contradict.
+    """One sentence for each entered value that the measurements contradict: those of `moved_too_far`.
 
-    `by_model` is how far what the model has wrong moves each parameter, one standard deviation, in prior deviations.
-    Where entries are as right as stated and the model as wrong as that, one room in twenty has such a sentence. Where
-    the velocity is doubtful (`doubtful`) none has: what is wrong with the model moves entries as well.
+    Where the velocity is doubtful (`doubtful`) there is none: what is wrong with the model moves entries as well.
     """
     fitted = prior.parameters(posterior.vector)
-    doubt = np.sqrt(1.0 + by_model**2)
-    limit = float(ndtri(1.0 - FALSE_ALARMS / (2.0 * max(len(doubt), 1))))
-    times = dict(zip(prior.names(), np.abs(posterior.vector) / doubt, strict=True))
-    believed = {name: n for name, n in times.items() if n > limit and doubt_of_velocity <= _DOUBTFUL}
+    believed = moved_too_far(prior, posterior, by_model) if doubt_of_velocity <= _DOUBTFUL else {}
     inlets = [b for b in problem.scene.boundary if isinstance(b, Inlet)]
     heaters = [b for b in problem.scene.boundary if isinstance(b, Heater)]
     said = []

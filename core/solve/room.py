@@ -120,7 +120,7 @@ def analyse(background: Background, problem: Problem, settings: RoomSettings, ma
         if explains_more(again, analysis):
             of_closure, of_heat = (), where_else(suspect.panel, suspect.spans_m)
             analysis, closure, suspect = again, name, None
-        else:
+        elif not explains_more(analysis, again):
             analysis = replace(analysis, rival=again.best.fields)
     if worth_large_eddies(analysis, settings):
         again = with_large_eddies(analysis, settings, marches)
