@@ -41,9 +41,11 @@ def suspected_heat(
     It is looked for where the fitted room lacks something, and where the fit moved an entry or the viscosity too far:
     an entry is not accused before a source that nobody stated has been tried in its place.
     """
-    moves = model_error_of(analysis).moves
-    strange = lacks_something(analysis) or moved_too_far(analysis.prior, analysis.posterior, moves)
-    if not settings.use_images or not strange:
+    if not settings.use_images:
+        return None
+    error = model_error_of(analysis)
+    lacks = missing(explained(analysis.data, analysis.best.fields), error)
+    if not lacks and not moved_too_far(analysis.prior, analysis.posterior, error.moves):
         return None
     return likeliest(background, analysis.data, settings, marches)
 

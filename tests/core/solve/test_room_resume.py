@@ -50,7 +50,9 @@ def timeless(solution: Solution) -> list[dict]:
 @pytest.fixture(scope="module")
 def problem() -> Problem:
     truth = solve_room(Problem(scene(SUPPLY), ()), SETTINGS)
-    return measured(scene(replace(SUPPLY, temperature_k=305.15)), truth, 1e-5)
+    # No further from the truth than its deviations allow, so that no other room is tried.
+    entered = replace(SUPPLY, temperature_k=304.15, temperature_std_k=1.0, velocity_std_m_s=0.1)
+    return measured(scene(entered), truth, 1e-5)
 
 
 @pytest.fixture(scope="module")
@@ -170,9 +172,10 @@ def test_it_tells_what_it_does_how_much_is_done_and_which_parameters_it_has(
     for row in rounds:
         assert row["misfit_left"] > 0
         assert row["elapsed_s"] > 0
-        # Entered 2 K too warm: the fit goes down from 12 K above ambient.
-        assert row["supply 1: temperature above ambient (K)"] < 12.0
-        assert 0.8 < row["supply 1: velocity ratio"] < 1.2
+        # Entered 1 K too warm: the fit goes down from 11 K above ambient.
+        assert row["supply 1: temperature above ambient (K)"] < 11.0
+        # Known to a quarter.
+        assert 0.6 < row["supply 1: velocity ratio"] < 1.4
     assert 0.0 < whole.history[-1]["supply_1_m_s"] < 0.5
 
 
