@@ -1,7 +1,8 @@
 """Model selection: is another closure, or a heat source that nobody stated, a better explanation of the images?
 
 Each alternative costs a whole fit. It is tried only where the fitted room leaves much of the images unexplained: for
-a heat source, more than half, or than models of the air differ in (`core.estimate.model_error`).
+a heat source, more than half, or than models of the air differ in (`core.estimate.model_error`). Heat is tried too
+where an entry had to move further than it may.
 """
 
 import numpy as np
@@ -51,10 +52,11 @@ def suspected_heat(
 
 
 def explains_more(one: Analysis, other: Analysis) -> bool:
-    """Whether, of a room with suspected heat and one without, `one` explains more than chance would, once in 20.
+    """Whether `one` explains more of the images than `other` beyond chance; one has suspected heat, one has not.
 
-    Twice the logarithm of the likelihoods' ratio, of the images' data that err by themselves, has a chi-square
-    distribution (Wilks 1938). Its degrees of freedom are the heat of the panel and of its neighbours.
+    Chance passes once in twenty. Twice the logarithm of the likelihoods' ratio, of the images' data that err by
+    themselves, has a chi-square distribution (Wilks 1938). Its degrees of freedom are the heat of the panel and of
+    its neighbours.
     """
     gained = 2.0 * independent(other.data) * np.log(left_over(other) / left_over(one))
     panels = 1 + 2 * len(told_on_floor(other.problem.scene))
