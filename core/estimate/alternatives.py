@@ -2,7 +2,7 @@
 
 Each alternative costs a whole fit. It is tried only where the fitted room leaves much of the images unexplained: for
 a heat source, more than half, or than models of the air differ in (`core.estimate.model_error`). Heat is tried too
-where an entry had to move further than it may.
+where an entry, or another parameter, had to move further than it may.
 """
 
 import numpy as np
@@ -39,8 +39,8 @@ def suspected_heat(
 ) -> Suspect | None:
     """The panel of floor whose heat may be missing; None where nothing is, or no panel would explain anything.
 
-    It is looked for where the fitted room lacks something, and where the fit moved an entry or the viscosity too far:
-    an entry is not accused before a source that nobody stated has been tried in its place.
+    It is looked for where the fitted room lacks something, and where the fit moved a parameter too far, such as an
+    entry: none is accused before a source that nobody stated has been tried in its place.
     """
     if not settings.use_images:
         return None

@@ -33,7 +33,7 @@ _SUSPICIOUS_K = 8.0
 def moved_too_far(
     prior: Prior, posterior: Posterior, by_model: Float[np.ndarray, " active"]
 ) -> dict[str, float]:
-    """Parameters that the fit moved further than entries and model may be wrong, and how many times that.
+    """The parameters that the fit moved too far, and how many times as far as entry and model may be wrong.
 
     `by_model` is how far what the model has wrong moves each parameter, one standard deviation, in prior deviations.
     Where entries are as right as stated and the model as wrong as that, one room in twenty has any.
@@ -229,8 +229,8 @@ def balances(
     """The room's heat balance in words, and a warning if heat is missing.
 
     `warmer_k` is how much warmer thermometers say that the air is than the room of these parameters, `warmer_std_k`
-    its standard deviation, which holds how far outlets may be from the air beside them. Heat is missing if it is more
-    than a tenth of what supplies and objects bring, and more than these deviations give in one room of twenty.
+    its standard deviation, which holds how far outlets may be from the air beside them. Heat is called missing if it
+    is more than a tenth of what supplies and objects bring, and more than chance gives in one room of twenty.
     """
     inflow_m3_s = float(inflows_m3_s.sum())
     if inflow_m3_s <= 0:

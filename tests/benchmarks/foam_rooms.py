@@ -19,7 +19,7 @@ from app.bench.openfoam import environment, run_foam
 from app.volume.scene import RigOptions, room_scene
 from core.air import GRAVITY_M_S2
 from core.geometry import face_of
-from core.known import stated_walls
+from core.known import stated_walls, supplied_m3_s
 from core.room.forward import room
 from core.room.room_grid import RoomGrid
 from core.scene import Heater, Inlet, Outlet, Patch, Scene
@@ -76,15 +76,13 @@ def computed(
 
 def leaving_m3_s(velocity_m_s: np.ndarray, scene: Scene, grid: RoomGrid) -> list[float]:
     """What leaves by each outlet, from the air beside it; all of it is what the supplies bring."""
-    leaving = []
+    centres_m, leaving = tuple(grid.centres_m(axis) for axis in range(3)), []
     for part in scene.boundary:
         if isinstance(part, Outlet):
             face = face_of(part.patch.wall)
             outward = -face.inward * np.take(velocity_m_s[..., face.axis], face.end, axis=face.axis)
-            centres_m = tuple(grid.centres_m(axis) for axis in range(3))
             leaving.append(float(outward[_covered(part.patch, centres_m)].mean() * part.patch.area_m2))
-    brought = sum(part.patch.area_m2 * part.inward_m_s for part in scene.boundary if isinstance(part, Inlet))
-    return [flow * brought / sum(leaving) for flow in leaving]
+    return [flow * supplied_m3_s(scene) / sum(leaving) for flow in leaving]
 
 
 def on_faces(what: Made, grid: RoomGrid) -> Made:
