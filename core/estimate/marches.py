@@ -39,8 +39,14 @@ class Marches:
         return time.perf_counter() - self._began_s
 
     def expect(self, more: float) -> None:
-        """So much `work` is to come besides."""
-        self._expected += more
+        """So much `work` is to come from now on; what was expected before has ended."""
+        with self._lock:
+            self._expected = self._done + more
+
+    def forgo(self, less: float) -> None:
+        """So much of the expected `work` will not come."""
+        with self._lock:
+            self._expected -= less
 
     def tell(self, row: Row, growing: Growing | None = None, *, under_way: float = 0.0) -> Row:
         """Tell a row, with the time and the share of the work that is done; the told row."""

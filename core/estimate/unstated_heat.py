@@ -26,7 +26,7 @@ import numpy as np
 from jaxtyping import Float
 
 from core.estimate.forward_runs import RoomSettings, march_under
-from core.estimate.marches import Marches
+from core.estimate.marches import Marches, work
 from core.estimate.observation import IMAGES, Observations
 from core.estimate.parameter_fit import Background
 from core.estimate.parameter_step import variance_of
@@ -151,6 +151,8 @@ def warmed_each(
     marches: Marches,
 ) -> list[Suspect]:
     """The best heat of each panel, each tried by itself."""
+    each = work(background.coarse.grid, settings.restarts_s(background.prior))
+    marches.expect(len(panels) * len(_LADDER_K) * each)
 
     def warmed(panel: SuspectedHeater) -> Suspect:
         cold = with_heaters(background.problem, [panel])
@@ -174,7 +176,7 @@ def _warmed(
     """Greatest correlation of the room's last heater, 0 if negative, and the heat that the data ask of it [K]."""
     best, best_k, flow = 0.0, 0.0, background.base.flow.last
     seconds = settings.restarts_s(background.prior)
-    for heat_k in _LADDER_K:
+    for tried_heats, heat_k in enumerate(_LADDER_K, 1):
         warm = eqx.tree_at(lambda p: p.heater_excess_k, mean, mean.heater_excess_k.at[-1].add(heat_k))
         tried = march_under(coarse, warm, flow, seconds, data.vertices, marches)
         change = data.unshared(data.predicted(tried.fields) - residual.before, residual.variance)
@@ -182,6 +184,7 @@ def _warmed(
         if likeness > best:
             best, best_k = likeness, scale * heat_k
         elif best > 0.0:
+            marches.forgo((len(_LADDER_K) - tried_heats) * work(coarse.grid, seconds))
             break
         flow = tried.flow.last
     return best, best_k
