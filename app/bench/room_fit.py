@@ -123,17 +123,20 @@ def moved(problem: Problem, drift_px: float, seed: int) -> Problem:
 def entered(problem: Problem, wrong: float, closure: str) -> Problem:
     """The problem with its supply entered `wrong` times too strong and warm, and another closure."""
     scene = problem.scene
-    ambient = scene.air.ambient_temperature_k
-
-    def mistaken(inlet: Inlet) -> Inlet:
-        x, y, z = (wrong * v for v in inlet.velocity_m_s)
-        temperature_k = ambient + wrong * (inlet.temperature_k - ambient)
-        return replace(inlet, temperature_k=temperature_k, velocity_m_s=(x, y, z))
-
-    boundary = tuple(mistaken(b) if isinstance(b, Inlet) else b for b in scene.boundary)
+    ambient_k = scene.air.ambient_temperature_k
+    boundary = tuple(
+        mistaken(part, wrong, ambient_k) if isinstance(part, Inlet) else part for part in scene.boundary
+    )
     flow = scene.flow if closure == "auto" else FlowModel(transport=closure)  # type: ignore[arg-type]
     changed: Scene = replace(scene, boundary=boundary, flow=flow)
     return with_scene(problem, changed)
+
+
+def mistaken(inlet: Inlet, wrong: float, ambient_k: float) -> Inlet:
+    """The inlet entered `wrong` times too fast and too far from the ambient temperature."""
+    x, y, z = (wrong * v for v in inlet.velocity_m_s)
+    temperature_k = ambient_k + wrong * (inlet.temperature_k - ambient_k)
+    return replace(inlet, temperature_k=temperature_k, velocity_m_s=(x, y, z))
 
 
 def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dict[str, Any]:

@@ -9,11 +9,12 @@ as their deviations say. Rooms of even number are for choosing anything, those o
 they are for nobody to look at.
 
     python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32] [--by openfoam]
-        [--views y,x] [--information surveyed]
-    python -m tests.benchmarks.random_rooms FOLDER --summary [--views y,x] [--information surveyed]
+        [--views y,x] [--information surveyed] [--wrong 1.2]
+    python -m tests.benchmarks.random_rooms FOLDER --summary [--views y,x] [--information surveyed] [--wrong 1.2]
     python -m tests.benchmarks.random_rooms FOLDER --stated  # everything is known, nothing is fitted
 
-Volumes and rows stay in FOLDER; a room that has its row by these views and this information is not fitted again.
+With `--wrong` the supply that brings most air is entered so many times too fast, and too far from the ambient
+temperature. Volumes and rows stay in FOLDER; a room that has its row by these options is not fitted again.
 """
 
 import argparse
@@ -26,7 +27,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from app.bench.room_fit import fit_row, problem_of
+from app.bench.room_fit import fit_row, mistaken, problem_of
 from app.reconstruct.problem import with_scene
 from app.volume.file import read_volume
 from app.volume.misread import misread
@@ -38,7 +39,7 @@ from core.problem import Problem
 from core.room.forward import room, room_fields
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.room.march import MarchSettings, march
-from core.scene import Outlet
+from core.scene import Inlet, Outlet
 from core.solve.room import RoomSettings
 from tests.benchmarks.foam_rooms import MODELS, computed
 from tests.benchmarks.other_rooms import T0_K, Made, marched
@@ -156,7 +157,13 @@ def made(folder: Path, number: int, by: str) -> Path:
 
 
 def row_of(
-    folder: Path, number: int, cells: int, by: str, walls: tuple[WallName, ...], information: Information
+    folder: Path,
+    number: int,
+    cells: int,
+    by: str,
+    walls: tuple[WallName, ...],
+    information: Information,
+    wrong: float,
 ) -> dict[str, Any]:
     """Make the room if it is not there, fit it, and say how far off the result is and what it says of itself."""
     path, what = made(folder, number, by), drawn(number)
@@ -164,7 +171,7 @@ def row_of(
     stated = what.heater is not None and (information == "surveyed" or number % 4 >= 2)
     # A surveyed room has its heater already.
     add = stated and information == "operator"
-    problem = _entered(problem, number, heater_of(read_volume(path)) if add else None)
+    problem = _entered(problem, number, heater_of(read_volume(path)) if add else None, wrong)
     fit = fit_row(problem, volume, RoomSettings(cells=cells))
     said = " ".join(fit["notes"])
     carried_k = inner(volume.temperature_k[:1] - volume.temperature_k)
@@ -172,6 +179,7 @@ def row_of(
         "room": number,
         "views": walls,
         "information": information,
+        "wrong": wrong,
         "closure": json.loads(path.with_suffix(".json").read_text())["closure"],
         "supplies": len(what.inlets),
         "heater": None if what.heater is None else ("stated" if stated else "not stated"),
@@ -221,12 +229,17 @@ def stated_row(folder: Path, number: int, cells: int, by: str) -> dict[str, Any]
     return row
 
 
-def _entered(problem: Problem, number: int, heater: Any) -> Problem:
-    """The problem as an operator enters it: the heater if it is stated, and every entry misread."""
+def _entered(problem: Problem, number: int, heater: Any, wrong: float) -> Problem:
+    """The problem as an operator enters it: the heater if it is stated, every entry misread, one supply wrong."""
     scene = problem.scene
     if heater is not None:
         scene = replace(scene, boundary=(*scene.boundary, heater))
-    return with_scene(problem, misread(scene, number))
+    scene = misread(scene, number)
+    inlets = [part for part in scene.boundary if isinstance(part, Inlet)]
+    most = max(inlets, key=lambda inlet: inlet.inward_m_s * inlet.patch.area_m2)
+    ambient_k = scene.air.ambient_temperature_k
+    boundary = tuple(mistaken(most, wrong, ambient_k) if part is most else part for part in scene.boundary)
+    return with_scene(problem, replace(scene, boundary=boundary))
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -257,9 +270,9 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _how(row: dict[str, Any]) -> tuple[tuple[WallName, ...], Information]:
-    """A row's views and information."""
-    return tuple(row.get("views", ("y_max",))), row.get("information", "operator")
+def _how(row: dict[str, Any]) -> tuple[tuple[WallName, ...], Information, float]:
+    """A row's views and information, and how wrong a supply is entered."""
+    return tuple(row.get("views", ("y_max",))), row.get("information", "operator"), row.get("wrong", 1.0)
 
 
 def main() -> None:
@@ -274,6 +287,7 @@ def main() -> None:
     parser.add_argument("--by", choices=("airlens", "openfoam"), default="airlens")
     parser.add_argument("--views", default="y", help="the walls that are looked at, such as y,x")
     parser.add_argument("--information", choices=get_args(Information), default="operator")
+    parser.add_argument("--wrong", type=float, default=1.0, help="multiplies the largest supply as entered")
     parser.add_argument("--stated", action="store_true", help="everything stated, nothing fitted")
     parser.add_argument("--summary", action="store_true")
     options = parser.parse_args()
@@ -281,7 +295,7 @@ def main() -> None:
     rows = options.folder / ("stated.jsonl" if options.stated else "rows.jsonl")
     walls = parse_walls(options.views)
     done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
-    asked = walls, options.information
+    asked = walls, options.information, options.wrong
     done = [row for row in done if _how(row) == asked]
     if options.summary:
         print(json.dumps(summary([row for row in done if row["room"] % 2])))
