@@ -3,7 +3,6 @@
 import equinox as eqx
 import numpy as np
 
-from core.data_error import CORRELATED_DATA
 from core.estimate.image_noise import images
 from core.estimate.observation import Observations
 from core.room.vertices import RoomFields
@@ -84,7 +83,7 @@ def likeness(data: Observations, fields: RoomFields) -> float:
         return 0.0
     seen = images(data, fields)
     product = float(seen.values_px @ seen.predicted_px)
-    by_noise = float(np.sqrt(CORRELATED_DATA * np.sum(seen.variance_px2 * seen.predicted_px**2)))
+    by_noise = float(np.sqrt(np.sum(seen.variance_px2 * seen.predicted_px**2)))
     if abs(product) <= TO_ONE_SIDE * by_noise:
         return 0.0
     signal = explained(data, fields).measured_px * np.sqrt(len(seen.values_px))
