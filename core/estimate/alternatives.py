@@ -14,7 +14,7 @@ from core.estimate.forward_runs import RoomSettings, other_closure
 from core.estimate.marches import Marches
 from core.estimate.parameter_fit import Background
 from core.estimate.posterior import Analysis, model_error_of
-from core.estimate.unstated_heat import Suspect, independent, likeliest
+from core.estimate.unstated_heat import Suspect, beyond_chance, independent, likeliest
 from core.room.forward import LARGE_EDDIES, Room
 from core.significance import FALSE_ALARMS
 from core.view_frame import told_on_floor
@@ -29,9 +29,11 @@ def left_over(analysis: Analysis) -> float:
     return explained(analysis.data, analysis.best.fields).share_left
 
 
-def lacks_something(analysis: Analysis) -> bool:
-    """Whether a room leaves so much of the images that something must be missing in it."""
-    return missing(explained(analysis.data, analysis.best.fields), model_error_of(analysis))
+def worth_naming(suspect: Suspect, analysis: Analysis) -> bool:
+    """Whether heat that a fit could not use is named: the room lacks something, and chance likes no panel as much."""
+    lacks = missing(explained(analysis.data, analysis.best.fields), model_error_of(analysis))
+    axes = len(told_on_floor(analysis.problem.scene))
+    return lacks and beyond_chance(suspect, independent(analysis.data), axes)
 
 
 def suspected_heat(

@@ -24,6 +24,7 @@ from typing import NamedTuple
 import equinox as eqx
 import numpy as np
 from jaxtyping import Float
+from scipy.special import ndtri
 
 from core.estimate.forward_runs import RoomSettings, march_under
 from core.estimate.marches import Marches, work
@@ -36,7 +37,7 @@ from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.room.forward import Room, room
 from core.scene import Heater, OnPatch, Patch
-from core.significance import EITHER_WAY
+from core.significance import EITHER_WAY, FALSE_ALARMS
 from core.view_frame import told_on_floor
 
 # Panels along an axis, each overlapping the next by half: five of them cover the floor's length.
@@ -120,6 +121,15 @@ def likeliest(
 def independent(data: Observations) -> float:
     """How many of the images' data err by themselves."""
     return float(np.sum(1.0 / data.alike()[data.values()[2] == IMAGES]))
+
+
+def beyond_chance(suspect: Suspect, count: float, axes: int) -> bool:
+    """Whether errors alone would like a panel as much in fewer than one room of twenty.
+
+    `count` data err by themselves; along each of so many axes `_PLACES` panels were tried, and only heat counts.
+    """
+    gained = -count * np.log(max(1.0 - suspect.likeness**2, np.finfo(float).tiny))
+    return bool(gained**0.5 > ndtri(1.0 - FALSE_ALARMS / (_PLACES * axes)))
 
 
 def likely_span_m(suspects: Sequence[Suspect], axis: int, count: float) -> tuple[float, float]:

@@ -14,12 +14,12 @@ import numpy as np
 from core.checkpoint import digest
 from core.estimate.alternatives import (
     explains_more,
-    lacks_something,
     left_over,
     promising_closure,
     stated_eddies,
     suspected_heat,
     worth_large_eddies,
+    worth_naming,
 )
 from core.estimate.diagnostics import another_closure, missing_heat, where_else
 from core.estimate.forward_runs import (
@@ -129,7 +129,7 @@ def analyse(background: Background, problem: Problem, settings: RoomSettings, ma
         elif left_over(again) < left_over(analysis):
             of_closure = (another_closure(LARGE_EDDIES, left_over(again), closure, left_over(analysis)),)
             analysis = again
-    if suspect is not None and lacks_something(analysis):
+    if suspect is not None and worth_naming(suspect, analysis):
         said = missing_heat(problem, suspect.panel, suspect.likeness)
         of_heat = (said, *where_else(suspect.panel, suspect.spans_m))
     doing = "take the room that was found"

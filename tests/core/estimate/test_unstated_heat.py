@@ -13,6 +13,7 @@ from core.estimate.temperature_levels import free_vertices
 from core.estimate.unstated_heat import (
     Residual,
     Suspect,
+    beyond_chance,
     likely_span_m,
     panels_along,
     with_heaters,
@@ -138,6 +139,25 @@ def test_where_heat_may_stand_is_said_only_if_the_images_do_not_tell_it():
         in where_else(panels[4], [(0, *few)])[0]
     )
     assert where_else(panels[4], [(0, *many)]) == ()
+
+
+def test_errors_alone_like_a_panel_beyond_chance_in_one_room_of_twenty():
+    panel = panels_along(problem(stated=False), 0, (1.0, 1.0))[0]
+    draw = np.random.default_rng(5)
+    count, rooms = 20.0, 1000
+    left, changes = draw.standard_normal((rooms, 1, 20)), draw.standard_normal((rooms, 9, 20))
+    correlations = (left * changes).sum(-1) / (
+        np.linalg.norm(left, axis=-1) * np.linalg.norm(changes, axis=-1)
+    )
+
+    alarms = [beyond_chance(Suspect(float(c), 20.0, panel), count, 1) for c in correlations.max(1)]
+
+    assert 0.03 < np.mean(alarms) < 0.08
+    # More data know better; where two axes were searched chance had twice as many panels.
+    assert not beyond_chance(Suspect(0.3, 20.0, panel), 20.0, 1)
+    assert beyond_chance(Suspect(0.3, 20.0, panel), 200.0, 1)
+    assert beyond_chance(Suspect(0.55, 20.0, panel), 20.0, 1)
+    assert not beyond_chance(Suspect(0.55, 20.0, panel), 20.0, 2)
 
 
 def test_a_panel_is_left_out_where_another_patch_lies():
