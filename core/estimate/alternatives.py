@@ -14,7 +14,7 @@ from core.estimate.forward_runs import RoomSettings, other_closure
 from core.estimate.marches import Marches
 from core.estimate.parameter_fit import Background
 from core.estimate.posterior import Analysis, model_error_of
-from core.estimate.unstated_heat import Suspect, beyond_chance, independent, likeliest
+from core.estimate.unstated_heat import Suspect, independent, is_placed, likeliest
 from core.room.forward import LARGE_EDDIES, Room
 from core.significance import FALSE_ALARMS
 from core.view_frame import told_on_floor
@@ -30,10 +30,9 @@ def left_over(analysis: Analysis) -> float:
 
 
 def worth_naming(suspect: Suspect, analysis: Analysis) -> bool:
-    """Whether heat that a fit could not use is named: the room lacks something, and chance likes no panel as much."""
+    """Whether heat that a fit could not use is named: the room lacks something, and images tell a place for it."""
     lacks = missing(explained(analysis.data, analysis.best.fields), model_error_of(analysis))
-    axes = len(told_on_floor(analysis.problem.scene))
-    return lacks and beyond_chance(suspect, independent(analysis.data), axes)
+    return lacks and is_placed(suspect, analysis.problem)
 
 
 def suspected_heat(

@@ -24,7 +24,6 @@ from typing import NamedTuple
 import equinox as eqx
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtri
 
 from core.estimate.forward_runs import RoomSettings, march_under
 from core.estimate.marches import Marches, work
@@ -37,7 +36,7 @@ from core.problem import Problem
 from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.room.forward import Room, room
 from core.scene import Heater, OnPatch, Patch
-from core.significance import EITHER_WAY, FALSE_ALARMS
+from core.significance import EITHER_WAY
 from core.view_frame import told_on_floor
 
 # Panels along an axis, each overlapping the next by half: five of them cover the floor's length.
@@ -123,13 +122,14 @@ def independent(data: Observations) -> float:
     return float(np.sum(1.0 / data.alike()[data.values()[2] == IMAGES]))
 
 
-def beyond_chance(suspect: Suspect, count: float, axes: int) -> bool:
-    """Whether errors alone would like a panel as much in fewer than one room of twenty.
-
-    `count` data err by themselves; along each of so many axes `_PLACES` panels were tried, and only heat counts.
-    """
-    gained = -count * np.log(max(1.0 - suspect.likeness**2, np.finfo(float).tiny))
-    return bool(gained**0.5 > ndtri(1.0 - FALSE_ALARMS / (_PLACES * axes)))
+def is_placed(suspect: Suspect, problem: Problem) -> bool:
+    """Whether the images tell, along some axis, a place for the heat from others: it may not stand all along it."""
+    box = problem.scene.room
+    slack_m = 1e-6 * np.array(box.size_m)
+    return any(
+        low_m > box.lower_m[axis] + slack_m[axis] or high_m < box.upper_m[axis] - slack_m[axis]
+        for axis, low_m, high_m in suspect.spans_m
+    )
 
 
 def likely_span_m(suspects: Sequence[Suspect], axis: int, count: float) -> tuple[float, float]:

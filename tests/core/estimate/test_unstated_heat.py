@@ -13,7 +13,7 @@ from core.estimate.temperature_levels import free_vertices
 from core.estimate.unstated_heat import (
     Residual,
     Suspect,
-    beyond_chance,
+    is_placed,
     likely_span_m,
     panels_along,
     with_heaters,
@@ -141,23 +141,20 @@ def test_where_heat_may_stand_is_said_only_if_the_images_do_not_tell_it():
     assert where_else(panels[4], [(0, *many)]) == ()
 
 
-def test_errors_alone_like_a_panel_beyond_chance_in_one_room_of_twenty():
-    panel = panels_along(problem(stated=False), 0, (1.0, 1.0))[0]
-    draw = np.random.default_rng(5)
-    count, rooms = 20.0, 1000
-    left, changes = draw.standard_normal((rooms, 1, 20)), draw.standard_normal((rooms, 9, 20))
-    correlations = (left * changes).sum(-1) / (
-        np.linalg.norm(left, axis=-1) * np.linalg.norm(changes, axis=-1)
-    )
+def test_heat_is_placed_only_if_it_may_not_stand_all_along_the_room():
+    given = problem(stated=False)
+    panels = panels_along(given, 0, (1.0, 1.0))
 
-    alarms = [beyond_chance(Suspect(float(c), 20.0, panel), count, 1) for c in correlations.max(1)]
+    def placed(*likeness: float) -> bool:
+        suspects = [Suspect(c, 20.0, panel) for c, panel in zip(likeness, panels, strict=True)]
+        span_m = likely_span_m(suspects, 0, 20.0)
+        return is_placed(suspects[4]._replace(spans_m=((0, *span_m),)), given)
 
-    assert 0.03 < np.mean(alarms) < 0.08
-    # More data know better; where two axes were searched chance had twice as many panels.
-    assert not beyond_chance(Suspect(0.3, 20.0, panel), 20.0, 1)
-    assert beyond_chance(Suspect(0.3, 20.0, panel), 200.0, 1)
-    assert beyond_chance(Suspect(0.55, 20.0, panel), 20.0, 1)
-    assert not beyond_chance(Suspect(0.55, 20.0, panel), 20.0, 2)
+    assert placed(0.1, 0.2, 0.3, 0.5, 0.8, 0.5, 0.3, 0.78, 0.2)
+    assert not placed(0.0, 0.01, 0.03, 0.05, 0.08, 0.05, 0.03, 0.07, 0.02)
+    # One of two axes is enough.
+    whole = (0, given.scene.room.lower_m[0], given.scene.room.upper_m[0])
+    assert is_placed(Suspect(0.4, 20.0, panels[4], (whole, (1, 0.2, 0.8))), given)
 
 
 def test_a_panel_is_left_out_where_another_patch_lies():
