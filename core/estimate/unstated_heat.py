@@ -186,7 +186,7 @@ def _warmed(
     """Greatest correlation of the room's last heater, 0 if negative, and the heat that the data ask of it [K]."""
     best, best_k, flow = 0.0, 0.0, background.base.flow.last
     seconds = settings.restarts_s(background.prior)
-    for tried_heats, heat_k in enumerate(_LADDER_K, 1):
+    for tried_so_far, heat_k in enumerate(_LADDER_K, 1):
         warm = eqx.tree_at(lambda p: p.heater_excess_k, mean, mean.heater_excess_k.at[-1].add(heat_k))
         tried = march_under(coarse, warm, flow, seconds, data.vertices, marches)
         change = data.unshared(data.predicted(tried.fields) - residual.before, residual.variance)
@@ -194,7 +194,7 @@ def _warmed(
         if likeness > best:
             best, best_k = likeness, scale * heat_k
         elif best > 0.0:
-            marches.forgo((len(_LADDER_K) - tried_heats) * work(coarse.grid, seconds))
+            marches.forgo((len(_LADDER_K) - tried_so_far) * work(coarse.grid, seconds))
             break
         flow = tried.flow.last
     return best, best_k

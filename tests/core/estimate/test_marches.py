@@ -4,31 +4,29 @@ from core.estimate.marches import Marches
 from core.watch import Watch
 
 
-class Told(list[float]):
-    """The shares that were told."""
+class Told(Marches):
+    """Marches that keep the shares which they tell."""
 
-    def marches(self) -> Marches:
-        """Marches that tell them."""
-        return Marches(Watch(lambda row, growing: self.append(float(row["share"]))))
+    def __init__(self) -> None:
+        self.shares: list[float] = []
+        super().__init__(Watch(lambda row, growing: self.shares.append(float(row["share"]))))
 
 
 def test_another_fit_begins_where_the_work_so_far_has_ended():
-    told = Told()
-    marches = told.marches()
+    marches = Told()
     marches.expect(10.0)
     marches.tell({"doing": "a"}, under_way=4.0)
     # Six of these ten never come: the fit ends early, and another one begins.
     marches.expect(10.0)
-    marches.tell({"doing": "b"}, under_way=4.0)
-    marches.tell({"doing": "b"}, under_way=10.0)
-    assert told == [0.4, 0.4, 0.99]
+    for under_way in (4.0, 10.0):
+        marches.tell({"doing": "b"}, under_way=under_way)
+    assert marches.shares == [0.4, 0.4, 0.99]
 
 
 def test_work_that_is_not_needed_counts_no_more():
-    told = Told()
-    marches = told.marches()
+    marches = Told()
     marches.expect(8.0)
     marches.tell({"doing": "look for heat"}, under_way=2.0)
     marches.forgo(4.0)
     marches.tell({"doing": "look for heat"}, under_way=2.0)
-    assert told == [0.25, 0.5]
+    assert marches.shares == [0.25, 0.5]
