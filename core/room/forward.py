@@ -123,7 +123,8 @@ def lattice_to_cells(lattice: Float[Array, "lx ly lz"], grid: RoomGrid) -> Float
     for a in AXES:
         nodes = np.linspace(0.0, 1.0, lattice.shape[a])
         points = (np.arange(grid.cells[a]) + 0.5) / grid.cells[a]
-        field = _apply_matrix(linear_matrix(nodes, points), field, a)
+        matrix = jnp.asarray(linear_matrix(nodes, points), jnp.float32)
+        field = jnp.moveaxis(jnp.tensordot(matrix, field, axes=(1, a)), 0, a)
     return field
 
 
@@ -131,11 +132,13 @@ def carried_over(flow: Flow, source: RoomGrid, target: RoomGrid) -> Flow:
     """A flow, linearly interpolated to another grid of its room; the first step removes its divergence."""
 
     def cells(field: Float[Array, "nx ny nz"], faces: int | None = None) -> Float[Array, "mx my mz"]:
+        found = np.asarray(field)
         for a in AXES:
             old = source.faces_m(a) if a == faces else source.centres_m(a)
             new = target.faces_m(a) if a == faces else target.centres_m(a)
-            field = _apply_matrix(linear_matrix(old, new), field, a)
-        return field
+            matrix = linear_matrix(old, new).astype(np.float32)
+            found = np.moveaxis(np.tensordot(matrix, found, axes=(1, a)), 0, a)
+        return jnp.asarray(found)
 
     u, v, w = (cells(flow.velocity[a], a) for a in AXES)
     velocity: Velocity = (u, v, w)
@@ -149,49 +152,38 @@ def room_fields(
     flow: Flow, model: RoomModel, layout: RoomLayout, vertices: tuple[int, int, int]
 ) -> RoomFields:
     """The flow on the room's vertices, and what leaves by each outlet."""
-    excess, pressure, velocity = _vertices(flow, model, vertices)
     leaving = [_outflow_excess_k(flow, model, *of) for of in _outlet_faces(layout)]
     return RoomFields(
-        np.asarray(excess), np.asarray(pressure), np.asarray(velocity), np.array(leaving, float)
-    )
-
-
-@eqx.filter_jit
-def _vertices(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> tuple[Array, Array, Array]:
-    return (
         vertex_excess_k(flow, model, vertices),
         vertex_pressure_m2_s2(flow, model, vertices),
         vertex_velocity_m_s(flow.velocity, model, vertices),
+        np.array(leaving, float),
     )
 
 
-def _outlet_faces(layout: RoomLayout) -> list[tuple[Face, Array, Array]]:
+def _outlet_faces(
+    layout: RoomLayout,
+) -> list[tuple[Face, Float[np.ndarray, "first second"], Float[np.ndarray, "first second"]]]:
     """Each outlet's face, its part of what leaves through every cell there, and the share that it covers."""
     found = []
     for outlet in layout.outlets:
         # Two outlets may share a cell's face: each has its part of what leaves there.
         covered = np.sum([o.fraction for o in layout.outlets if o.wall == outlet.wall], axis=0)
         part = outlet.fraction / np.where(covered > 0, covered, 1.0)
-        both = (jnp.asarray(values, jnp.float32) for values in (part, outlet.fraction))
-        found.append((face_of(WALLS[outlet.wall]), *both))
+        found.append((face_of(WALLS[outlet.wall]), part, outlet.fraction))
     return found
 
 
-@eqx.filter_jit
 def _outflow_excess_k(
     flow: Flow,
     model: RoomModel,
     face: Face,
-    part: Float[Array, "first second"],
-    area: Float[Array, "first second"],
-) -> Float[Array, ""]:
+    part: Float[np.ndarray, "first second"],
+    area: Float[np.ndarray, "first second"],
+) -> float:
     """Flow-weighted mean of the air beside an outlet; by area where no air leaves."""
     wall = model.boundary.walls[face.axis][face.upper]
-    leaving = part * jnp.maximum(-face.inward * wall.normal_m_s, 0.0)
-    beside = jnp.take(flow.excess_k, face.end, axis=face.axis)
-    by_flow = jnp.sum(leaving * beside) / jnp.maximum(jnp.sum(leaving), 1e-12)
-    return jnp.where(jnp.sum(leaving) > 0, by_flow, jnp.sum(area * beside) / jnp.sum(area))
-
-
-def _apply_matrix(matrix: np.ndarray, field: Float[Array, "..."], axis: int) -> Float[Array, "..."]:
-    return jnp.moveaxis(jnp.tensordot(jnp.asarray(matrix, jnp.float32), field, axes=(1, axis)), 0, axis)
+    leaving = part * np.maximum(-face.inward * np.asarray(wall.normal_m_s), 0.0)
+    beside = np.asarray(flow.excess_k).take(face.end, face.axis)
+    weight = leaving if leaving.sum() > 0 else area
+    return float((weight * beside).sum() / weight.sum())

@@ -16,8 +16,9 @@ from dataclasses import replace
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
 from core.result import Outcome
 from core.room.eddies import LargeEddies, stirred
@@ -131,7 +132,7 @@ def _after_window(
     """The state a window later, and how the march ended if it did so."""
     start, seconds = state.flow, settings.window_s
     mean, flow, lived_s, taken = window(start, model, settings, state, check_stop)
-    if not bool(_finite(flow)):
+    if not _finite(flow):
         if state.courant < settings.courant:
             return state, Outcome.nonfinite
         return replace(state, courant=0.5 * state.courant), None
@@ -222,9 +223,8 @@ def _shifted(flow: Flow, shift_k: Float[Array, " nz"]) -> Flow:
     return eqx.tree_at(lambda f: f.excess_k, flow, flow.excess_k + shift_k[None, None, :])
 
 
-@eqx.filter_jit
-def _finite(flow: Flow) -> Bool[Array, ""]:
-    return jnp.all(jnp.array([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(flow)]))
+def _finite(flow: Flow) -> bool:
+    return all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(flow))
 
 
 @eqx.filter_jit

@@ -1,18 +1,19 @@
-"""From cells to the room's vertices: linear between cell centres, with the walls' values on the walls."""
+"""From cells to the room's vertices: linear between cell centres, with the walls' values on the walls.
 
-from collections.abc import Callable
+It is done once a march, in NumPy: to compile it takes longer than a hundred rooms.
+"""
 
 import equinox as eqx
-import jax.numpy as jnp
+import jax
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from core.room.room_grid import AXES, Cells, RoomGrid, Velocity, cut, first_plane, last_plane
+from core.room.room_grid import AXES, RoomGrid, Velocity
 from core.room.step import Flow, RoomModel
-from core.room.wall_planes import Boundary, WallPlane
+from core.room.wall_planes import WallPlane
 
-Vertices = Float[Array, "vx vy vz"]
-Field = Float[Array, "..."]
+Vertices = Float[np.ndarray, "vx vy vz"]
+Field = Float[np.ndarray, "..."]
 
 
 class RoomFields(eqx.Module):
@@ -32,26 +33,30 @@ def vertex_excess_k(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]
     """
 
     def value(wall: WallPlane, cell: Field, inward: float) -> Field:
-        share = jnp.where(wall.conductance_m_s > 0, wall.held, 0.0)
+        share = np.where(wall.conductance_m_s > 0, wall.held, 0.0)
         held = share * wall.wall_excess_k + (1.0 - share) * cell
-        return jnp.where(inward * wall.normal_m_s > 0, wall.inflow_excess_k, held)
+        return np.where(inward * wall.normal_m_s > 0, wall.inflow_excess_k, held)
 
-    planes = _on_walls(flow.excess_k, model.boundary, value)
-    return _to_vertices(_extended(flow.excess_k, planes), model.grid, vertices)
+    cells, walls = jax.device_get((flow.excess_k, model.boundary.walls))
+    planes = [
+        (value(low, first, 1.0), value(high, last, -1.0))
+        for (low, high), (first, last) in zip(walls, _end_planes(cells), strict=True)
+    ]
+    return _to_vertices(_extended(cells, planes), model.grid, vertices)
 
 
 def vertex_pressure_m2_s2(flow: Flow, model: RoomModel, vertices: tuple[int, int, int]) -> Vertices:
     """Kinematic pressure minus its mean over the outlets (over the room where there is none)."""
-    cells = flow.pressure_m2_s2
-    planes = [(first_plane(cells, a), last_plane(cells, a)) for a in AXES]
+    cells, walls = jax.device_get((flow.pressure_m2_s2, model.boundary.walls))
+    planes = _end_planes(cells)
     # The hydrostatic part is linear in z up to the wall.
     planes[2] = (1.5 * cells[:, :, 0] - 0.5 * cells[:, :, 1], 1.5 * cells[:, :, -1] - 0.5 * cells[:, :, -2])
-    total, area = jnp.float32(0.0), jnp.float32(0.0)
-    for a in AXES:
-        for inward, wall, plane in zip((1.0, -1.0), model.boundary.walls[a], planes[a], strict=True):
-            out = jnp.maximum(-inward * wall.normal_m_s, 0.0)
-            total, area = total + jnp.sum(out * plane), area + jnp.sum(out)
-    gauge = jnp.where(area > 0, total / jnp.maximum(area, 1e-20), cells.mean())
+    total = area = 0.0
+    for pair, both in zip(walls, planes, strict=True):
+        for inward, wall, plane in zip((1.0, -1.0), pair, both, strict=True):
+            out = np.maximum(-inward * wall.normal_m_s, 0.0)
+            total, area = total + float(np.sum(out * plane)), area + float(np.sum(out))
+    gauge = total / area if area > 0 else float(cells.mean())
     return _to_vertices(
         _extended(cells - gauge, [(p - gauge, q - gauge) for p, q in planes]), model.grid, vertices
     )
@@ -59,16 +64,17 @@ def vertex_pressure_m2_s2(flow: Flow, model: RoomModel, vertices: tuple[int, int
 
 def vertex_velocity_m_s(
     velocity: Velocity, model: RoomModel, vertices: tuple[int, int, int]
-) -> Float[Array, "vx vy vz 3"]:
+) -> Float[np.ndarray, "vx vy vz 3"]:
     """Velocity; zero on no-slip walls except in openings."""
+    inner, walls = jax.device_get((velocity, model.boundary.walls))
     components = []
     for a in AXES:
-        component = velocity[a]
+        component = inner[a]
         for b in AXES:
             if b != a:
-                component = _close(component, model.boundary.walls[b], a, b)
+                component = _close(component, walls[b], a, b)
         components.append(_to_vertices(component, model.grid, vertices, faces=a))
-    return jnp.stack(components, -1)
+    return np.stack(components, -1)
 
 
 def cell_matrix(
@@ -93,30 +99,23 @@ def linear_matrix(
     return matrix
 
 
-def _on_walls(
-    cells: Cells, boundary: Boundary, value: Callable[[WallPlane, Field, float], Field]
-) -> list[tuple[Field, Field]]:
-    return [
-        (
-            value(boundary.walls[a][0], first_plane(cells, a), 1.0),
-            value(boundary.walls[a][1], last_plane(cells, a), -1.0),
-        )
-        for a in AXES
-    ]
+def _end_planes(cells: Field) -> list[tuple[Field, Field]]:
+    """The cells beside the two walls of each axis."""
+    return [(cells.take(0, a), cells.take(-1, a)) for a in AXES]
 
 
-def _extended(cells: Cells, planes: list[tuple[Field, Field]]) -> Field:
+def _extended(cells: Field, planes: list[tuple[Field, Field]]) -> Field:
     """Cells with the walls' values around them; an edge has the mean of its two walls."""
-    field = jnp.pad(cells, 1, mode="edge")
+    field = np.pad(cells, 1, mode="edge")
     for a in AXES:
         for end, plane in zip((0, -1), planes[a], strict=True):
-            field = field.at[tuple(end if b == a else slice(1, -1) for b in AXES)].set(plane)
+            field[tuple(end if b == a else slice(1, -1) for b in AXES)] = plane
     for a in AXES:
         b, c = (other for other in AXES if other != a)
         for i, i1 in ((0, 1), (-1, -2)):
             for j, j1 in ((0, 1), (-1, -2)):
                 one, two = _line(a, b, c, i1, j), _line(a, b, c, i, j1)
-                field = field.at[_line(a, b, c, i, j)].set(0.5 * (field[one] + field[two]))
+                field[_line(a, b, c, i, j)] = 0.5 * (field[one] + field[two])
     return field
 
 
@@ -129,24 +128,26 @@ def _line(a: int, b: int, c: int, i: int, j: int) -> tuple[slice | int, ...]:
 def _close(component: Field, walls: tuple[WallPlane, WallPlane], a: int, b: int) -> Field:
     """Component a with its values on the two walls of axis b."""
     first, _ = (c for c in AXES if c != b)
+    axis = 0 if a == first else 1
     planes = []
-    for wall, nearest in zip(walls, (first_plane, last_plane), strict=True):
-        axis = 0 if a == first else 1
-        tangent = wall.tangent_m_s[axis]
+    for wall, cell in zip(walls, (component.take(0, b), component.take(-1, b)), strict=True):
         # Onto a's faces: the end faces repeat their cell.
-        padded = jnp.pad(tangent, [(1, 1) if d == axis else (0, 0) for d in (0, 1)], mode="edge")
-        on_faces = 0.5 * (cut(padded, 0, -1, axis) + cut(padded, 1, 0, axis))
-        cell = nearest(component, b)
+        padded = np.moveaxis(
+            np.pad(wall.tangent_m_s[axis], [(1, 1) if d == axis else (0, 0) for d in (0, 1)], mode="edge"),
+            axis,
+            0,
+        )
+        on_faces = np.moveaxis(0.5 * (padded[:-1] + padded[1:]), 0, axis)
         # An axis whose walls were added before has two more planes.
         grown = [((n - m) // 2,) * 2 for n, m in zip(cell.shape, on_faces.shape, strict=True)]
-        planes.append(wall.no_slip * jnp.pad(on_faces, grown, mode="edge") + (1.0 - wall.no_slip) * cell)
-    return jnp.concatenate([jnp.expand_dims(planes[0], b), component, jnp.expand_dims(planes[1], b)], b)
+        planes.append(wall.no_slip * np.pad(on_faces, grown, mode="edge") + (1.0 - wall.no_slip) * cell)
+    return np.concatenate([np.expand_dims(planes[0], b), component, np.expand_dims(planes[1], b)], b)
 
 
 def _to_vertices(
     field: Field, grid: RoomGrid, vertices: tuple[int, int, int], *, faces: int | None = None
 ) -> Vertices:
     for a in AXES:
-        matrix = jnp.asarray(cell_matrix(grid, a, vertices[a], faces=faces == a), jnp.float32)
-        field = jnp.moveaxis(jnp.tensordot(matrix, field, axes=(1, a)), 0, a)
+        matrix = cell_matrix(grid, a, vertices[a], faces=faces == a).astype(np.float32)
+        field = np.moveaxis(np.tensordot(matrix, field, axes=(1, a)), 0, a)
     return field
