@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Float32
 from core.fields import AbstractField
 from core.render.light import pattern_image
 from core.render.pixel_filter import quadrature
-from core.render.pixel_geometry import pixel_geometry
+from core.render.pixel_geometry import filled, pixel_geometry, shared_count
 from core.render.pixels import Exposure, lens_points, pattern_motion
 from core.render.render_choice import RenderChoice, choose
 from core.scene import Scene
@@ -41,7 +41,7 @@ def _render(scene: Scene, view: int, field: AbstractField | None) -> Float32[np.
     rows = min(max(1, _PIXELS_A_BLOCK // camera.width_px), camera.height_px)
     image = np.zeros((camera.height_px, camera.width_px), np.float32)
     for first in range(0, camera.height_px, rows):
-        geometry = pixel_geometry(scene, view, _filled(_raster(first, rows, camera.width_px, 1)))
+        geometry = pixel_geometry(scene, view, filled(_raster(first, rows, camera.width_px, 1)))
         exposure = Exposure(geometry, offsets[:, None], weights)
         lit = np.zeros(len(geometry.weight), np.float32)
         points = lens_points(choice)
@@ -64,11 +64,11 @@ def _motion(
     """The pattern's motion of a block: from a ray a sample, or from rays every `stride` pixels."""
     width, stride = scene.views[view].camera.width_px, choice.stride
     if not stride:
-        pixels = _filled(_raster(first, rows, width, 1))
+        pixels = filled(_raster(first, rows, width, 1))
         geometries = [pixel_geometry(scene, view, pixels + o, point) for o in quadrature(choice.samples)[0]]
         return jnp.stack([_traced(g, field, choice) for g in geometries])
     lattice = _raster(first, rows + 2 * stride - 1, width + 2 * stride - 1, stride)
-    geometry = pixel_geometry(scene, view, _filled(lattice), point)
+    geometry = pixel_geometry(scene, view, filled(lattice), point)
     lattice_cols = len(np.arange(0, width + 2 * stride - 1, stride))
     motion = _traced(geometry, field, choice)
     layout = (len(lattice), lattice_cols, stride, rows, width)
@@ -78,17 +78,6 @@ def _motion(
 def _raster(first_row: int, rows: int, cols: int, stride: int) -> Float[np.ndarray, "pixels 2"]:
     row, column = np.mgrid[first_row : first_row + rows : stride, 0:cols:stride]
     return np.stack([column.ravel(), row.ravel()], axis=1).astype(float)
-
-
-def _filled(pixels: Float[np.ndarray, "pixels 2"]) -> Float[np.ndarray, "more 2"]:
-    """The last one again, up to a number that many blocks share: pictures of other sizes run the same programs."""
-    return np.pad(pixels, ((0, _shared(len(pixels)) - len(pixels)), (0, 0)), mode="edge")
-
-
-def _shared(count: int) -> int:
-    """The next power of two, or half as much again."""
-    power = 1 << (count - 1).bit_length()
-    return 3 * power // 4 if 4 * count <= 3 * power else power
 
 
 _traced = eqx.filter_jit(pattern_motion)
@@ -109,7 +98,7 @@ def _spread_motion(
     values = jnp.concatenate([motion * known, known], axis=1)[:count].reshape(-1, cols, 4)
     full = _spread(_spread(values, stride).swapaxes(0, 1), stride).swapaxes(0, 1)[:rows, :width]
     own = (full[..., :3] / jnp.maximum(full[..., 3:], 1e-6)).reshape(-1, 3)
-    return jnp.pad(own, ((0, _shared(rows * width) - rows * width), (0, 0)))
+    return jnp.pad(own, ((0, shared_count(rows * width) - rows * width), (0, 0)))
 
 
 def _spread(values: Float[Array, "n m c"], stride: int) -> Float[Array, "fine m c"]:

@@ -57,13 +57,25 @@ def pixel_geometry(
             "scene's light alone here. Take data_term = 'displacement', or the preset draft or standard."
         )
     with jax.enable_x64(True):
-        return _batch(
+        found = _batch(
             corners_of(scene.room),
             pinhole(scene.views[view].camera),
             pattern_map(scene),
-            jnp.asarray(np.asarray(pixels, np.float64)),
+            jnp.asarray(filled(np.asarray(pixels, np.float64))),
             jnp.asarray(np.array(lens_point_m, np.float64)),
         )
+    return jax.tree.map(lambda of: jnp.asarray(np.asarray(of)[: len(pixels)]), found)
+
+
+def filled(pixels: Float[np.ndarray, "pixels 2"]) -> Float[np.ndarray, "more 2"]:
+    """The last one again, up to a number that many blocks share: pictures of other sizes run the same programs."""
+    return np.pad(pixels, ((0, shared_count(len(pixels)) - len(pixels)), (0, 0)), mode="edge")
+
+
+def shared_count(count: int) -> int:
+    """The next power of two, or half as much again."""
+    power = 1 << (count - 1).bit_length() if count else 0
+    return 3 * power // 4 if 4 * count <= 3 * power else power
 
 
 @eqx.filter_jit
