@@ -33,7 +33,7 @@ class LargeEddies(AbstractAlgebraicClosure):
 def stirred(boundary: Boundary, moment: Int[Array, ""]) -> Boundary:
     """The walls at this moment, an integer: their supplies' air moves along the wall by a draw for each cell."""
     planes = [plane for walls in boundary.walls for wall in walls for plane in wall.tangent_m_s]
-    # One draw for all walls: a draw for each takes ten times as long to compile.
+    # One draw for all walls: a draw for each takes six times as long to compile.
     drawn = jax.random.normal(jax.random.key(moment), (sum(plane.size for plane in planes),), jnp.float32)
     parts = iter(jnp.split(drawn, np.cumsum([plane.size for plane in planes])[:-1]))
 
