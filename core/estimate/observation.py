@@ -23,7 +23,7 @@ from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.rays.operator import StraightRayOperator, build
 from core.rays.visibility import away_from_walls
 from core.room.room_grid import AXES
-from core.room.vertices import RoomFields, linear_matrix
+from core.room.vertices import RoomFields, interpolated, linear_matrix
 from core.scene import Outlet, Scene
 from core.view_frame import facing
 
@@ -248,7 +248,7 @@ def _on_plane(
     first, second = face_of(plane.wall).along
     for axis, points, at in ((first, plane.first_m, 0), (second, plane.second_m, 1)):
         nodes = np.linspace(room.lower_m[axis], room.upper_m[axis], wall.shape[at])
-        wall = np.moveaxis(np.tensordot(linear_matrix(nodes, points), wall, axes=(1, at)), 0, at)
+        wall = interpolated(linear_matrix(nodes, points), wall, at)
     return wall
 
 

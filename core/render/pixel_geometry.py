@@ -56,24 +56,28 @@ def pixel_geometry(
             f"View {eye.name!r} looks at {eye.wall} or by a light of its own; rays are traced to y_max and by the "
             "scene's light alone here. Take data_term = 'displacement', or the preset draft or standard."
         )
+    many = filled(np.asarray(pixels, np.float64))
     with jax.enable_x64(True):
         found = _batch(
             corners_of(scene.room),
             pinhole(scene.views[view].camera),
             pattern_map(scene),
-            jnp.asarray(filled(np.asarray(pixels, np.float64))),
+            jnp.asarray(many),
             jnp.asarray(np.array(lens_point_m, np.float64)),
         )
+    if len(many) == len(pixels):
+        return found
+    # Cut by NumPy: JAX would compile a program for each number of pixels.
     return jax.tree.map(lambda of: jnp.asarray(np.asarray(of)[: len(pixels)]), found)
 
 
 def filled(pixels: Float[np.ndarray, "pixels 2"]) -> Float[np.ndarray, "more 2"]:
-    """The last one again, up to a number that many blocks share: pictures of other sizes run the same programs."""
+    """The last pixel again, up to `shared_count`: pictures of other sizes run the same compiled programs."""
     return np.pad(pixels, ((0, shared_count(len(pixels)) - len(pixels)), (0, 0)), mode="edge")
 
 
 def shared_count(count: int) -> int:
-    """The next power of two, or half as much again."""
+    """The least number, not below `count`, that is a power of two or one and a half times one."""
     power = 1 << (count - 1).bit_length() if count else 0
     return 3 * power // 4 if 4 * count <= 3 * power else power
 

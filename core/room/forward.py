@@ -21,6 +21,7 @@ from core.room.room_grid import AXES, RoomGrid, Velocity, room_grid
 from core.room.step import Flow, RoomModel, air_at_rest, room_model
 from core.room.vertices import (
     RoomFields,
+    interpolated,
     linear_matrix,
     vertex_excess_k,
     vertex_pressure_m2_s2,
@@ -137,7 +138,7 @@ def carried_over(flow: Flow, source: RoomGrid, target: RoomGrid) -> Flow:
             old = source.faces_m(a) if a == faces else source.centres_m(a)
             new = target.faces_m(a) if a == faces else target.centres_m(a)
             matrix = linear_matrix(old, new).astype(np.float32)
-            found = np.moveaxis(np.tensordot(matrix, found, axes=(1, a)), 0, a)
+            found = interpolated(matrix, found, a)
         return jnp.asarray(found)
 
     u, v, w = (cells(flow.velocity[a], a) for a in AXES)

@@ -1,6 +1,6 @@
 """From cells to the room's vertices: linear between cell centres, with the walls' values on the walls.
 
-It is done once a march, in NumPy: to compile it takes longer than a hundred rooms.
+In NumPy: it is done once a march, and compiling it would take as long as a hundred marches' vertices.
 """
 
 import equinox as eqx
@@ -99,6 +99,11 @@ def linear_matrix(
     return matrix
 
 
+def interpolated(matrix: Float[np.ndarray, "points nodes"], field: Field, axis: int) -> Field:
+    """A field on the points of one axis instead of its nodes."""
+    return np.moveaxis(np.tensordot(matrix, field, axes=(1, axis)), 0, axis)
+
+
 def _end_planes(cells: Field) -> list[tuple[Field, Field]]:
     """The cells beside the two walls of each axis."""
     return [(cells.take(0, a), cells.take(-1, a)) for a in AXES]
@@ -131,13 +136,12 @@ def _close(component: Field, walls: tuple[WallPlane, WallPlane], a: int, b: int)
     axis = 0 if a == first else 1
     planes = []
     for wall, cell in zip(walls, (component.take(0, b), component.take(-1, b)), strict=True):
-        # Onto a's faces: the end faces repeat their cell.
-        padded = np.moveaxis(
-            np.pad(wall.tangent_m_s[axis], [(1, 1) if d == axis else (0, 0) for d in (0, 1)], mode="edge"),
-            axis,
-            0,
+        # Onto a's faces, each between two cells: the end faces repeat their cell.
+        below, above = (
+            np.pad(wall.tangent_m_s[axis], [ends if d == axis else (0, 0) for d in (0, 1)], mode="edge")
+            for ends in ((1, 0), (0, 1))
         )
-        on_faces = np.moveaxis(0.5 * (padded[:-1] + padded[1:]), 0, axis)
+        on_faces = 0.5 * (below + above)
         # An axis whose walls were added before has two more planes.
         grown = [((n - m) // 2,) * 2 for n, m in zip(cell.shape, on_faces.shape, strict=True)]
         planes.append(wall.no_slip * np.pad(on_faces, grown, mode="edge") + (1.0 - wall.no_slip) * cell)
@@ -149,5 +153,5 @@ def _to_vertices(
 ) -> Vertices:
     for a in AXES:
         matrix = cell_matrix(grid, a, vertices[a], faces=faces == a).astype(np.float32)
-        field = np.moveaxis(np.tensordot(matrix, field, axes=(1, a)), 0, a)
+        field = interpolated(matrix, field, a)
     return field
