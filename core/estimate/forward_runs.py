@@ -28,10 +28,10 @@ from core.setting import check_range, setting
 # of them; the limit stops a march whose air is far faster than what was stated.
 _STEPS = 0.6
 
-# Large eddies are marched so many times as long, in true time, which has up to four times as many steps. They are
-# never steady: the mean is that over the last two thirds. Supplies are disturbed anew every sixteen steps.
+# Large eddies are marched so many times as long, in true time, which has up to four times as many steps. Supplies are
+# disturbed anew every sixteen steps.
 EDDIES_LONGER, _TRUE_TIME = 2.0, 4
-_EDDIES = {"steady": False, "tolerance": 0.0, "settled": 1.0, "mean_share": 2 / 3, "chunk_steps": 8}
+_EDDIES = {"steady": False, "tolerance": 0.0, "settled": 1.0, "chunk_steps": 8}
 
 # A jet in the reference room responds to a change of its supply within this time.
 _RESPONSE_S = 60.0
@@ -141,9 +141,11 @@ def march_under(
     marches: Marches,
     *,
     doing: str | None = None,
+    mean_windows: int | None = None,
 ) -> ForwardRun:
     """March `flow` under these parameters; `seconds` are those of the reference room.
 
+    The result is the mean over the last `mean_windows`, or over as many as the room's unrest asks for.
     What the march is for, `doing`, is told with every window; without it nothing is.
     """
     model = where.model(parameters)
@@ -153,7 +155,7 @@ def march_under(
         flow = Flow(flow.velocity, flow.excess_k, flow.pressure_m2_s2, None)
     if where.closure == LARGE_EDDIES:
         seconds = EDDIES_LONGER * seconds
-    timing = _timing(where, seconds)
+    timing = replace(_timing(where, seconds), mean_windows=mean_windows)
     counted = work(where.grid, seconds)
 
     def passed(state: MarchState) -> None:
@@ -205,21 +207,30 @@ def perturbed(
     """Restarts of the run `base` under the parameters `vector`: one for each that is moved, and one as they are.
 
     Each parameter is moved by as far as it is uncertain, `spread` (in prior deviations): a derivative must hold over
-    that range, and a room's response is no straight line. What is not yet steady is so in all of them alike. Returns
-    the derivatives and the run that none was moved in, where the next restarts begin.
+    that range, and a room's response is no straight line. What is not yet steady is so in all of them alike, and all
+    are means over the same windows. Returns the derivatives and the run that none was moved in, where the next
+    restarts begin.
     """
     flow, seconds = base.flow.last, settings.restarts_s(prior)
 
-    def one(step: Float[np.ndarray, " active"]) -> ForwardRun:
-        return march_under(where, prior.parameters(vector + step), flow, seconds, vertices, marches)
+    def one(step: Float[np.ndarray, " active"], mean_windows: int | None = None) -> ForwardRun:
+        parameters = prior.parameters(vector + step)
+        return march_under(where, parameters, flow, seconds, vertices, marches, mean_windows=mean_windows)
 
-    found: list[ForwardRun] = []
+    def moved(step: Float[np.ndarray, " active"]) -> RoomFields:
+        return one(step, unmoved.flow.mean_windows).fields
+
+    def told(count: int) -> None:
+        doing = "move one parameter after the other"
+        marches.record({"doing": doing, "moved": float(count), "of": float(len(spread))})
+
+    unmoved = one(np.zeros(len(spread)))
+    told(0)
+    others: list[RoomFields] = []
     with ThreadPoolExecutor(settings.threads) as pool:
-        for run in pool.map(one, [np.zeros(len(spread)), *np.diag(spread)]):
-            found.append(run)
-            doing = "move one parameter after the other"
-            marches.record({"doing": doing, "moved": len(found) - 1.0, "of": float(len(spread))})
-    unmoved, others = found[0], [run.fields for run in found[1:]]
+        for fields in pool.map(moved, np.diag(spread)):
+            others.append(fields)
+            told(len(others))
     return Derivatives(unmoved.fields, others, np.diag(spread)), unmoved
 
 

@@ -30,15 +30,15 @@ class Journal:
         if content is None:
             return None
         found = decode(content)
-        blank = (like, like, 0.0, 0, 0.0)
-        last, mean, model_s, steps, change = restore(found, blank, configuration=self._configuration)
-        return March(last, mean, Outcome[found.header["shape"]["outcome"]], model_s, steps, change)
+        blank = (like, like, 0.0, 0, 0.0, 0)
+        last, mean, model_s, *counted = restore(found, blank, configuration=self._configuration)
+        return March(last, mean, Outcome[found.header["shape"]["outcome"]], model_s, *counted)
 
     def keep_end(self, key: str, march: March) -> None:
         """Keep a march that has ended; what was kept of it on the way goes."""
         if self._store is None:
             return
-        numbers = (march.model_s, march.steps, march.change)
+        numbers = (march.model_s, march.steps, march.change, march.mean_windows)
         state = (march.last, march.mean, *numbers)
         shape = {"outcome": march.outcome.name}
         self._store[f"march-{key}"] = self._encoded(state, march.steps, shape)

@@ -1,16 +1,16 @@
 """March a room to its steady state, in windows of model time.
 
 The march ends when the mean velocity of a window differs from that of the window before by less than `tolerance`
-(relative rms), at `longest_s`, or after `most_steps`. The result is the mean over the last fifth of the time, since
-flows on coarse grids may oscillate; over more of it where large eddies are marched. If a value becomes infinite, the
-march returns to the last window and halves the Courant number, once.
+(relative rms), at `longest_s`, or after `most_steps`. The result is the mean over the last windows, as many as the
+room's unrest asks for (`core.room.unrest`). If a value becomes infinite, the march returns to the last window and
+halves the Courant number, once.
 
 Time is what the room's cells have lived through in the mean: each takes its own steps (`core.room.pace`).
 
 Between two chunks of steps a march can be stopped; it goes on from its last window (`MarchState`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import equinox as eqx
@@ -26,6 +26,7 @@ from core.room.level import level_correction
 from core.room.pace import StepLimits, step_limits
 from core.room.room_grid import Cells
 from core.room.step import Flow, RoomModel, own_pace, two_steps
+from core.room.unrest import settled_windows
 from core.setting import SettingError, setting
 
 # Of the stable Courant number, in the first chunk of a room with objects.
@@ -40,10 +41,12 @@ class MarchSettings:
 
     `least_s`: no march is called steady before it; just after a change of the supply windows hardly differ.
     `level_ahead_s`: how far the layers' heat balance is extrapolated after each window (`core.room.level`; 0: not at
-    all), from `settle_s` to two thirds of `longest_s`, or to where the mean begins. No window begins after
-    `most_steps`. A march that ends by its longest time counts as converged if its last windows differ by less than
-    `settled`. One that is not `steady` is true in time: all cells take the same steps, and no wave is damped.
-    `mean_share`: the result is the mean over this last part of the time.
+    all), from `settle_s` to two thirds of `longest_s`. No window begins after `most_steps`. A march that ends by its
+    longest time counts as converged if its last windows differ by less than `settled`; as unsteady if they do not and
+    the mean takes more than two; else it was cut off. One that is not `steady` is true in time: all cells take the
+    same steps, and no wave is damped.
+    `mean_windows`: the result is the mean over so many of the last windows; None takes as many as the room's unrest
+    asks for.
     """
 
     longest_s: float = 60.0
@@ -57,7 +60,7 @@ class MarchSettings:
     chunk_steps: int = 20
     most_steps: int = 1_000_000
     steady: bool = True
-    mean_share: float = 0.2
+    mean_windows: int | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.courant <= 0.5:
@@ -73,7 +76,7 @@ class MarchSettings:
 
 
 class March(eqx.Module):
-    """The end of a march: last state, mean of the last part, how it ended, model time and steps."""
+    """The end of a march: last state, mean of the last windows and how many, how it ended, model time and steps."""
 
     last: Flow
     mean: Flow
@@ -81,13 +84,11 @@ class March(eqx.Module):
     model_s: float = eqx.field(static=True)
     steps: int = eqx.field(static=True)
     change: float = eqx.field(static=True)
+    mean_windows: int = eqx.field(static=True)
 
 
 class MarchState(eqx.Module):
-    """A march between two windows: all that the next one depends on, and what is kept of those before.
-
-    `means` are of the last windows so far, by `MarchSettings.mean_share`.
-    """
+    """A march between two windows: all that the next one depends on, and the means of those before."""
 
     flow: Flow
     means: tuple[Flow, ...] = ()
@@ -119,8 +120,11 @@ def march(
             break
         state, outcome = _after_window(state, model, settings, check_stop)
         on_window(state)
-    mean = _mean(list(state.means)) if state.means else state.flow
-    return March(state.flow, mean, outcome, state.model_s, state.steps, state.change)
+    means = state.means or (state.flow,)
+    last = min(len(means), settings.mean_windows or settled_windows(means))
+    if outcome is Outcome.step_limit and last > 2:
+        outcome = Outcome.unsteady
+    return March(state.flow, _mean(means[-last:]), outcome, state.model_s, state.steps, state.change, last)
 
 
 def _after_window(
@@ -138,17 +142,15 @@ def _after_window(
         return replace(state, courant=0.5 * state.courant), None
     model_s, windows = state.model_s + seconds, state.windows + 1
     change = float(_relative_change(mean, state.means[-1])) if state.means else float("inf")
-    outcome, levelled = None, min(2 / 3, 1.0 - settings.mean_share)
+    outcome = None
     if change < settings.tolerance and model_s > settings.least_s - 1e-6:
         outcome = Outcome.converged
-    elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * levelled:
+    elif settings.level_ahead_s > 0 and settings.settle_s < model_s < settings.longest_s * 2 / 3:
         # As an array the time ahead is no part of the compiled program.
         ahead_s = jnp.asarray(settings.level_ahead_s, jnp.float32)
         flow = _levelled(flow, (flow.excess_k - start.excess_k) / lived_s, model, ahead_s)
-    # Only the last ones are needed, whenever the march ends.
-    means = (*state.means, mean)[-max(1, round(windows * settings.mean_share)) :]
     steps = state.steps + taken
-    return MarchState(flow, means, state.courant, model_s, steps, windows, change), outcome
+    return MarchState(flow, (*state.means, mean), state.courant, model_s, steps, windows, change), outcome
 
 
 def window(
@@ -235,7 +237,7 @@ def _relative_change(flow: Flow, before: Flow) -> Float[Array, ""]:
     return jnp.sqrt(moved / (total + 1e-20))
 
 
-def _mean(flows: list[Flow], weights: list[float] | None = None) -> Flow:
+def _mean(flows: Sequence[Flow], weights: list[float] | None = None) -> Flow:
     share = jnp.asarray(weights or [1.0] * len(flows), jnp.float32)
     share = share / share.sum()
     return jax.tree.map(lambda *leaves: sum(w * leaf for w, leaf in zip(share, leaves, strict=True)), *flows)

@@ -19,7 +19,7 @@ from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, View, Wall
 
 INTENSITY, SPEED_M_S = 0.2, 0.5
 SETTINGS = MarchSettings(
-    longest_s=8.0, window_s=2.0, tolerance=0.0, level_ahead_s=0.0, steady=False, mean_share=0.5, chunk_steps=4
+    longest_s=8.0, window_s=2.0, tolerance=0.0, level_ahead_s=0.0, steady=False, mean_windows=2, chunk_steps=4
 )
 
 

@@ -144,6 +144,24 @@ def test_stratified_air_that_swings_comes_to_rest_sooner():
     assert speed(steady=True) < 0.4 * speed(steady=False)
 
 
+def test_air_that_swings_on_is_unsteady_and_its_mean_is_over_many_windows():
+    model = flat_room(16, 1e-5, (slippery, slippery), (slippery, slippery), 1.0)
+    height_m, along_m = model.grid.centres_m(2), model.grid.centres_m(0)
+    tilted = height_m[None, None, :] + 0.05 * np.cos(np.pi * along_m)[:, None, None]
+    start = air_at_rest(model, jnp.asarray(np.broadcast_to(tilted, model.grid.cells), jnp.float32), 0.0)
+
+    end = march(
+        start,
+        model,
+        MarchSettings(longest_s=30.0, window_s=2.0, tolerance=0.0, level_ahead_s=0.0, steady=False),
+    )
+
+    assert end.outcome is Outcome.unsteady
+    assert end.mean_windows > 5
+    fastest = [max(float(jnp.abs(of).max()) for of in flow.velocity) for flow in (end.mean, end.last)]
+    assert fastest[0] < 0.5 * fastest[1]
+
+
 def test_the_step_keeps_positive_weights_where_air_hardly_moves():
     model = flat_room(8, 1e-2, (as_it_is, as_it_is), (as_it_is, as_it_is), 0.0)
     still = air_at_rest(model, jnp.zeros(model.grid.cells), 0.0)

@@ -96,8 +96,8 @@ def test_stopped_anywhere_it_goes_on_to_bitwise_the_same_end(
         (4, "march the coarse room", [cut]),
         # While two threads march, whether or not either has a window to keep.
         (questions.count // 2, "move one parameter", [some, some | cut]),
-        # At the last question: in the last restart, for the deviations of what was found.
-        (questions.count - 1, "move one parameter", [some, some | cut]),
+        # At the last question.
+        (questions.count - 1, "", [some, some | cut]),
     ):
         store: dict[str, bytes] = {}
         told = stopped(problem, store, Asked(n))
@@ -108,11 +108,13 @@ def test_stopped_anywhere_it_goes_on_to_bitwise_the_same_end(
         assert timeless(resumed) == timeless(whole)
 
 
-def test_stopped_again_and_again_it_advances_each_time_and_ends_the_same(problem: Problem, whole: Solution):
+def test_stopped_again_and_again_it_advances_each_time_and_ends_the_same(
+    problem: Problem, whole: Solution, questions: Asked
+):
     store: dict[str, bytes] = {}
     watch = None
     for attempt in itertools.count(1):
-        asked = Asked(45)
+        asked = Asked(questions.count // 3)
         watch = Watch(should_stop=asked, store=store)
         try:
             found = solve_room(problem, replace(SETTINGS, threads=1), watch)
@@ -127,7 +129,7 @@ def test_a_march_that_ended_is_never_marched_again(problem: Problem, whole: Solu
     store: dict[str, bytes] = {}
     solve_room(problem, SETTINGS, Watch(store=store))
     ends = [name for name in store if name.startswith("march-")]
-    assert len(ends) > 10
+    assert len(ends) > 5
     assert not [name for name in store if name.startswith("cut-")]
 
     # One question a march, and none for chunks.
