@@ -29,9 +29,9 @@ from core.setting import check_range, setting
 _STEPS = 0.6
 
 # Large eddies are marched so many times as long, in true time, which has up to four times as many steps. Supplies are
-# disturbed anew every sixteen steps.
+# disturbed anew every sixteen steps. What warms during a window is chance, so no level is extrapolated from it.
 EDDIES_LONGER, _TRUE_TIME = 2.0, 4
-_EDDIES = {"steady": False, "tolerance": 0.0, "settled": 1.0, "chunk_steps": 8}
+_EDDIES = {"steady": False, "tolerance": 0.0, "settled": 1.0, "level_ahead_s": 0.0, "chunk_steps": 8}
 
 # A jet in the reference room responds to a change of its supply within this time.
 _RESPONSE_S = 60.0
