@@ -31,8 +31,9 @@ class Journal:
             return None
         found = decode(content)
         blank = (like, like, 0.0, 0, 0.0, 0)
-        last, mean, model_s, *counted = restore(found, blank, configuration=self._configuration)
-        return March(last, mean, Outcome[found.header["shape"]["outcome"]], model_s, *counted)
+        last, mean, model_s, steps, change, windows = restore(found, blank, configuration=self._configuration)
+        outcome = Outcome[found.header["shape"]["outcome"]]
+        return March(last, mean, outcome, model_s, steps, change, windows)
 
     def keep_end(self, key: str, march: March) -> None:
         """Keep a march that has ended; what was kept of it on the way goes."""
