@@ -42,6 +42,7 @@ def apart(found: Optics, true: Optics) -> tuple[float, float]:
     return math.dist(found.position_m, true.position_m), math.acos(min(1.0, (np.trace(turned) - 1) / 2))
 
 
+@pytest.mark.timeout(900)
 def test_each_camera_is_calibrated_by_its_name_and_both_give_the_temperature(folder):
     stated = score_experiment(folder, ROOM, reconstruct(folder, "draft").folder)["T"]["rms_K"]
     views = open_experiment(folder).settings.scene.views
