@@ -17,7 +17,7 @@ class Outcome(Enum):
     """How a solve ended; the value is the advice."""
 
     converged = "The solution settled."
-    unsteady = "The air of the fitted room does not come to rest: the result is its mean over time."
+    unsteady = "The room's air still changed when its march ended: the result is the mean over its last part."
     plateau = "The loss stopped falling; more iterations would not help."
     step_limit = "The iteration limit was reached. Raise it, or start from this result."
     time_limit = "The time limit was reached. Raise it, or start from this result."

@@ -13,6 +13,7 @@ from core.estimate.diagnostics import (
     doubtful,
     misfit,
     other_way,
+    outlets_found,
     undetermined,
 )
 from core.estimate.explained import explained, likeness
@@ -121,6 +122,7 @@ def sentences(
         *contradictions(analysis.problem, analysis.prior, analysis.posterior, error.moves, doubt),
         *misfit(analysis.data, explained(analysis.data, analysis.best.fields), error),
         *doubtful(doubt),
+        *outlets_found(analysis.layout, analysis.prior, analysis.posterior, parameters),
         *other_way(likeness(analysis.data, analysis.stated_room)),
         *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, moved_k, level_std_k),
     ]
@@ -145,7 +147,8 @@ def doubt_of_velocity(analysis: Analysis, error: ModelError) -> float:
 
 def outflow_excess_k(analysis: Analysis) -> float:
     """Mean over the outlets, weighted with what leaves by each; 0 in a room without any."""
-    return float(np.dot(analysis.layout.outlet_shares, analysis.best.fields.outflow_excess_k))
+    shares = np.asarray(analysis.layout.leaving_shares(analysis.best.parameters))
+    return float(np.dot(shares, analysis.best.fields.outflow_excess_k))
 
 
 def hydrostatic_m2_s2(

@@ -42,9 +42,8 @@ class MarchSettings:
     `least_s`: no march is called steady before it; just after a change of the supply windows hardly differ.
     `level_ahead_s`: how far the layers' heat balance is extrapolated after each window (`core.room.level`; 0: not at
     all), from `settle_s` to two thirds of `longest_s`. No window begins after `most_steps`. A march that ends by its
-    longest time counts as converged if its last windows differ by less than `settled`; as unsteady if they do not and
-    the mean takes more than two; else it was cut off. One that is not `steady` is true in time: all cells take the
-    same steps, and no wave is damped.
+    longest time counts as converged if its last windows differ by less than `settled`, else as unsteady. One that is
+    not `steady` is true in time: all cells take the same steps, and no wave is damped.
     `mean_windows`: the result is the mean over so many of the last windows; None takes as many as the room's unrest
     asks for.
     """
@@ -116,14 +115,13 @@ def march(
     outcome = None
     while outcome is None:
         if state.model_s >= settings.longest_s - 1e-6 or state.steps >= settings.most_steps:
-            outcome = Outcome.converged if state.change < settings.settled else Outcome.step_limit
+            still = Outcome.step_limit if state.steps >= settings.most_steps else Outcome.unsteady
+            outcome = Outcome.converged if state.change < settings.settled else still
             break
         state, outcome = _after_window(state, model, settings, check_stop)
         on_window(state)
     means = state.means or (state.flow,)
     last = min(len(means), settings.mean_windows or settled_windows(means))
-    if outcome is Outcome.step_limit and last > 2:
-        outcome = Outcome.unsteady
     return March(state.flow, _mean(means[-last:]), outcome, state.model_s, state.steps, state.change, last)
 
 

@@ -7,15 +7,19 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.estimate.diagnostics import contradictions, misfit, other_way
+from core.estimate.diagnostics import contradictions, misfit, other_way, outlets_found
 from core.estimate.discrepancy import temperature_correction
 from core.estimate.explained import explained, likeness
 from core.estimate.least_squares import Posterior
 from core.estimate.model_error import ModelError
 from core.estimate.observation import IMAGES, observations
+from core.known import leaving_excess_k
 from core.motion import CameraMotion
 from core.problem import Problem, ShiftMeasurement
+from core.room.boundary_conditions import SuspectedHeater
+from core.room.forward import room
 from core.room.vertices import RoomFields
+from core.scene import Outlet, Patch
 from tests.core.estimate.test_temperature_levels import prior_of, problem
 
 VERTICES = (8, 8, 8)
@@ -177,3 +181,56 @@ def test_a_camera_that_moved_by_far_more_than_the_air_did_makes_no_temperature(s
 
     # Of 4 K.
     assert np.abs(found.excess_k).max() < 0.05
+
+
+def test_what_leaves_by_an_outlet_is_told_with_its_interval():
+    given = problem(stated=True)
+    high = Outlet(patch=Patch(wall="z_max", lower_m=(0.7, 0.4), upper_m=(1.3, 0.6)))
+    both = Problem(replace(given.scene, boundary=(*given.scene.boundary, high)), ())
+    layout = room(both.scene, 8, "constant").layout
+    prior = prior_of(both)
+    own = prior.names().index("outlet_log_share[1]")
+    vector, covariance = np.zeros(len(prior.names())), 0.01 * np.eye(len(prior.names()))
+    # Three times what leaves by the first, which is as large: 1.57 deviations of 0.7.
+    vector[own] = np.log(3.0) / 0.7
+
+    said = outlets_found(layout, prior, Posterior(vector, covariance, np.zeros(0)), prior.parameters(vector))
+
+    # Of the ratio's logarithm 0.137 either way.
+    assert said == [
+        "By outlet 2, on z_max, 75 % of the air leaves (95 %: 72 to 77 %); by the outlets' areas it would be 50 %."
+    ]
+    alone = room(given.scene, 8, "constant").layout
+    stated = np.zeros(len(prior_of(given).names()))
+    found = Posterior(stated, np.eye(len(stated)), np.zeros(0))
+    assert outlets_found(alone, prior_of(given), found, prior_of(given).parameters(stated)) == []
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_panel_that_is_colder_beside_a_warm_source_is_no_source_nor_the_other_way_round(sign: float):
+    given = problem(stated=True)
+    panels = tuple(
+        SuspectedHeater(
+            patch=Patch(wall="z_min", lower_m=(x_m, 0.8), upper_m=(x_m + 0.4, 1.2)),
+            temperature_k=293.15,
+            temperature_std_k=20.0,
+        )
+        for x_m in (0.2, 0.6, 1.0)
+    )
+    warmed = Problem(replace(given.scene, boundary=(*given.scene.boundary, *panels)), ())
+    prior = prior_of(warmed)
+    of_air_k = leaving_excess_k(warmed) or 0.0
+    vector = np.zeros(len(prior.names()))
+    for n, above_air_k in enumerate((12.0, 53.0, -11.0)):
+        vector[prior.names().index(f"heater_excess_k[{n}]")] = (sign * above_air_k + of_air_k) / 20.0
+    found = Posterior(vector, 0.01 * np.eye(len(vector)), np.zeros(0))
+
+    said = [
+        text for text in contradictions(warmed, prior, found, np.zeros(len(vector))) if "floor panel" in text
+    ]
+
+    word = "warmer" if sign > 0 else "colder"
+    assert [text.partition(" m, ")[2][: len("12 K warmer")] for text in said] == [
+        f"12 K {word}",
+        f"53 K {word}",
+    ]
