@@ -20,6 +20,8 @@ from core.significance import EITHER_WAY
 _PIXELS, _FRAMES = 2000, 100
 # Words of every sentence that bids distrust of a whole result. Swapped pictures explain the rest, so they come first.
 _DOUBTS = ("may be swapped", "distrust")
+# Words of every sentence that sends people to look at the room or an entry. What is missing may explain the latter.
+_CHECKS = ("State it as a heater", "Look for a source", "Check it", "is not as stated")
 
 
 def summary(finding: Finding) -> tuple[str, ...]:
@@ -144,6 +146,7 @@ def _sure(finding: Finding) -> str:
 def _advice(finding: Finding) -> Iterable[str]:
     solution, scene = finding.solution, finding.experiment.settings.scene
     yield from _doubts_of(finding)[1:]
+    yield from checks(finding.manifest.get("assumed", ()))
     if solution.outcome in (Outcome.step_limit, Outcome.time_limit, Outcome.nonfinite):
         yield f"The solve did not come to its end. {solution.outcome.value}"
     yield from _unstated(found_in(finding.manifest))
@@ -169,9 +172,19 @@ def _advice(finding: Finding) -> Iterable[str]:
 
 def doubts(sentences: Iterable[str]) -> tuple[str, ...]:
     """Of what a result says, what must be looked into before it is believed, the most telling first."""
+    return _picked(sentences, _DOUBTS)
+
+
+def checks(sentences: Iterable[str]) -> tuple[str, ...]:
+    """Of what a result says, what is to be looked at in the room or among the entries, but what bids distrust."""
     said = tuple(sentences)
-    ordered = (one for word in _DOUBTS for one in said if word in one)
-    return tuple(dict.fromkeys(ordered))
+    return tuple(one for one in _picked(said, _CHECKS) if one not in doubts(said))
+
+
+def _picked(sentences: Iterable[str], words: Sequence[str]) -> tuple[str, ...]:
+    """The sentences with any of these words, in the order of the words."""
+    said = tuple(sentences)
+    return tuple(dict.fromkeys(one for word in words for one in said if word in one))
 
 
 def _doubts_of(finding: Finding) -> tuple[str, ...]:
