@@ -130,9 +130,15 @@ def objects_heat(
     return said
 
 
-def outlets_found(layout: RoomLayout, prior: Prior, posterior: Posterior, found: RoomParameters) -> list[str]:
-    """What leaves by each outlet whose share nobody stated, with its 95 % interval."""
-    own = dict(zip(prior.names(), posterior.spread, strict=True))
+def outlets_found(
+    layout: RoomLayout,
+    prior: Prior,
+    posterior: Posterior,
+    found: RoomParameters,
+    by_model: Float[np.ndarray, " active"],
+) -> list[str]:
+    """What leaves by each outlet whose share nobody stated, with its 95 % interval; `by_model` as above."""
+    own = dict(zip(prior.names(), np.hypot(posterior.spread, by_model), strict=True))
     said = []
     for n, outlet in enumerate(layout.outlets):
         name = f"outlet_log_share[{n}]"

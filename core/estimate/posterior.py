@@ -122,7 +122,7 @@ def sentences(
         *contradictions(analysis.problem, analysis.prior, analysis.posterior, error.moves, doubt),
         *misfit(analysis.data, explained(analysis.data, analysis.best.fields), error),
         *doubtful(doubt),
-        *outlets_found(analysis.layout, analysis.prior, analysis.posterior, parameters),
+        *outlets_found(analysis.layout, analysis.prior, analysis.posterior, parameters, error.moves),
         *other_way(likeness(analysis.data, analysis.stated_room)),
         *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, moved_k, level_std_k),
     ]

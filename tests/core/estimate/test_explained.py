@@ -191,19 +191,22 @@ def test_what_leaves_by_an_outlet_is_told_with_its_interval():
     prior = prior_of(both)
     own = prior.names().index("outlet_log_share[1]")
     vector, covariance = np.zeros(len(prior.names())), 0.01 * np.eye(len(prior.names()))
+    by_model = np.zeros(len(vector))
     # Three times what leaves by the first, which is as large: 1.57 deviations of 0.7.
     vector[own] = np.log(3.0) / 0.7
 
-    said = outlets_found(layout, prior, Posterior(vector, covariance, np.zeros(0)), prior.parameters(vector))
+    posterior, parameters = Posterior(vector, covariance, np.zeros(0)), prior.parameters(vector)
+    said = outlets_found(layout, prior, posterior, parameters, by_model)
+    less_sure = outlets_found(layout, prior, posterior, parameters, by_model + 0.5)
 
-    # Of the ratio's logarithm 0.137 either way.
-    assert said == [
-        "By outlet 2, on z_max, 75 % of the air leaves (95 %: 72 to 77 %); by the outlets' areas it would be 50 %."
-    ]
+    # Of the ratio's logarithm 0.137 either way, or 0.70.
+    of = "By outlet 2, on z_max, 75 % of the air leaves (95 %: {}); by the outlets' areas it would be 50 %."
+    assert said == [of.format("72 to 77 %")]
+    assert less_sure == [of.format("60 to 86 %")]
     alone = room(given.scene, 8, "constant").layout
     stated = np.zeros(len(prior_of(given).names()))
     found = Posterior(stated, np.eye(len(stated)), np.zeros(0))
-    assert outlets_found(alone, prior_of(given), found, prior_of(given).parameters(stated)) == []
+    assert outlets_found(alone, prior_of(given), found, prior_of(given).parameters(stated), stated) == []
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
