@@ -137,7 +137,10 @@ def outlets_found(
     found: RoomParameters,
     by_model: Float[np.ndarray, " active"],
 ) -> list[str]:
-    """What leaves by each outlet whose share nobody stated, with its 95 % interval; `by_model` as above."""
+    """What leaves by each outlet whose share nobody stated, with its 95 % interval.
+
+    `by_model` is how far what the model has wrong moves each parameter (`moved_too_far`).
+    """
     own = dict(zip(prior.names(), np.hypot(posterior.spread, by_model), strict=True))
     said = []
     for n, outlet in enumerate(layout.outlets):

@@ -4,7 +4,8 @@ Supply: the operator's values and deviations, but at least 2 % of the contrast a
 model is no better than that. Walls of stated temperature: one heat coefficient, from the heat balance if the outflow
 temperature is measured, else the nominal one of free convection (1 to 3 W/m2K). Unknown walls: the nominal
 coefficient, and a temperature each, in which the air's temperature is linear. A wall at the temperature of the air is
-adiabatic. The mean of the unknown temperatures comes from the heat balance.
+adiabatic. The mean of the unknown temperatures comes from the heat balance. Outlets share what leaves by area, within
+a factor of two, where nobody states a flow.
 """
 
 import equinox as eqx
