@@ -292,7 +292,7 @@ class Outlet:
     patch: Patch
     """Where air leaves."""
     flow_m3_s: float | None = None
-    """What leaves by it; outlets without it share the rest by area; where none has it, as the pictures ask."""
+    """What leaves by it; outlets without it share what remains of the supplies' flow by area."""
     mean_temperature_k: float | None = None
     """A thermometer in it; without it the outlet fixes no level."""
     temperature_std_k: float = 0.1

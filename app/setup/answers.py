@@ -179,7 +179,7 @@ class OutletAnswer(OpeningAnswer):
     """Where air leaves; a thermometer in it fixes the level of every temperature."""
 
     flow: Flow | None = None
-    """Volume that leaves by it; outlets without it share the rest by area; where none has it, as the pictures ask."""
+    """Volume that leaves by it; outlets without it share what remains of the supplies' flow by area."""
     temperature: Temperature | None = None
     """Of the air that leaves; without a thermometer leave it out."""
     temperature_deviation: Difference = 0.3

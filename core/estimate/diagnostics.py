@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
@@ -12,10 +11,9 @@ from core.estimate.least_squares import Posterior
 from core.estimate.model_error import ModelError
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior, looked_through
-from core.geometry import WALLS
 from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
-from core.room.boundary_conditions import RoomLayout, RoomParameters, SuspectedHeater
+from core.room.boundary_conditions import RoomParameters, SuspectedHeater
 from core.scene import Driving, Heater, Inlet
 from core.significance import EITHER_WAY, FALSE_ALARMS
 from core.view_frame import told_on_floor
@@ -128,39 +126,6 @@ def objects_heat(
             text + (f" It was moved {_evidence(believed[name])}. Check it." if name in believed else "")
         )
     return said
-
-
-def outlets_found(
-    layout: RoomLayout,
-    prior: Prior,
-    posterior: Posterior,
-    found: RoomParameters,
-    by_model: Float[np.ndarray, " active"],
-) -> list[str]:
-    """What leaves by each outlet whose share nobody stated, with its 95 % interval.
-
-    `by_model` is how far what the model has wrong moves each parameter (`moved_too_far`).
-    """
-    own = dict(zip(prior.names(), np.hypot(posterior.spread, by_model), strict=True))
-    said = []
-    for n, outlet in enumerate(layout.outlets):
-        name = f"outlet_log_share[{n}]"
-        if name not in own:
-            continue
-        far = EITHER_WAY * float(prior.std.outlet_log_share[n]) * float(own[name])
-        low, likely, high = (
-            100.0 * float(layout.leaving_shares(_with_share(found, n, by))[n]) for by in (-far, 0.0, far)
-        )
-        said.append(
-            f"By outlet {n + 1}, on {WALLS[outlet.wall]}, {likely:.0f} % of the air leaves (95 %: {low:.0f} to "
-            f"{high:.0f} %); by the outlets' areas it would be {100.0 * layout.outlet_shares[n]:.0f} %."
-        )
-    return said
-
-
-def _with_share(found: RoomParameters, outlet: int, more: float) -> RoomParameters:
-    log_share = found.outlet_log_share.at[outlet].add(more)
-    return eqx.tree_at(lambda p: p.outlet_log_share, found, log_share)
 
 
 def suspicion(problem: Problem, heater: SuspectedHeater, by_k: float) -> list[str]:

@@ -17,7 +17,6 @@ _WORDS = {
     "heater_excess_k": ("heater {n}", _ABOVE),
     "heater_log_heat": ("heater {n}", "heat coefficient ratio"),
     "log_closure": ("air", "eddy viscosity ratio"),
-    "outlet_log_share": ("outlet {n}", "share ratio"),
     "object_power_w": ("object {n}", "heat (W)"),
     "object_excess_k": ("object {n}", _ABOVE),
     "object_log_heat": ("object {n}", "heat coefficient ratio"),

@@ -13,7 +13,6 @@ from core.estimate.diagnostics import (
     doubtful,
     misfit,
     other_way,
-    outlets_found,
     undetermined,
 )
 from core.estimate.explained import explained, likeness
@@ -122,7 +121,6 @@ def sentences(
         *contradictions(analysis.problem, analysis.prior, analysis.posterior, error.moves, doubt),
         *misfit(analysis.data, explained(analysis.data, analysis.best.fields), error),
         *doubtful(doubt),
-        *outlets_found(analysis.layout, analysis.prior, analysis.posterior, parameters, error.moves),
         *other_way(likeness(analysis.data, analysis.stated_room)),
         *balances(parameters, inflow, outflow_excess_k(analysis), analysis.problem, moved_k, level_std_k),
     ]
@@ -147,8 +145,7 @@ def doubt_of_velocity(analysis: Analysis, error: ModelError) -> float:
 
 def outflow_excess_k(analysis: Analysis) -> float:
     """Mean over the outlets, weighted with what leaves by each; 0 in a room without any."""
-    shares = np.asarray(analysis.layout.leaving_shares(analysis.best.parameters))
-    return float(np.dot(shares, analysis.best.fields.outflow_excess_k))
+    return float(np.dot(analysis.layout.outlet_shares, analysis.best.fields.outflow_excess_k))
 
 
 def hydrostatic_m2_s2(

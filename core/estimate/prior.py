@@ -4,8 +4,7 @@ Supply: the operator's values and deviations, but at least 2 % of the contrast a
 model is no better than that. Walls of stated temperature: one heat coefficient, from the heat balance if the outflow
 temperature is measured, else the nominal one of free convection (1 to 3 W/m2K). Unknown walls: the nominal
 coefficient, and a temperature each, in which the air's temperature is linear. A wall at the temperature of the air is
-adiabatic. The mean of the unknown temperatures comes from the heat balance. Outlets share what leaves by area, within
-a factor of two, where nobody states a flow.
+adiabatic. The mean of the unknown temperatures comes from the heat balance.
 """
 
 import equinox as eqx
@@ -26,7 +25,7 @@ from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomLayout, RoomParameters, SuspectedHeater
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
-from core.scene import Heater, Inlet, Outlet, Scene
+from core.scene import Heater, Inlet, Scene
 from core.view_frame import looked_along
 
 # Walls' heat coefficients are known within a factor of two: one sigma is 0.6 in the logarithm.
@@ -44,8 +43,6 @@ _CLOSURE_STD, _SIMPLE_CLOSURE_STD = 0.12, 0.25
 # No room has one viscosity everywhere. If one is asked for without a value, it is fitted as a coarse lattice, within
 # a factor of 4.5 (one sigma).
 _GUESSED_VISCOSITY_STD = 1.5
-# How much leaves by an outlet, beside the first one, is known within a factor of two where nobody states any flow.
-_OUTLET_STD = 0.7
 # Least deviations of a supply: of its temperature, as a share of the contrast, and of its flow.
 _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
 
@@ -136,7 +133,7 @@ class Prior(eqx.Module):
         if suspected.any():
             return ~suspected
         walls = ("wall_excess_k", "log_heat") if self.unknown_walls() else ()
-        own = ("log_closure", "log_viscosity", "outlet_log_share", *walls)
+        own = ("log_closure", "log_viscosity", *walls)
         return np.array([name.startswith(own) for name in self.names()], bool)
 
 
@@ -171,7 +168,6 @@ def room_prior(
         jnp.float32(0.0),
         jnp.zeros((3, 3, 4)),
         *object_means(scene),
-        jnp.zeros(len(layout.outlets)),
     )
     simple = scene.flow.transport in ("given", "zero_equation")
     if log_viscosity_std is None:
@@ -188,7 +184,6 @@ def room_prior(
         jnp.float32(_SIMPLE_CLOSURE_STD if simple else _CLOSURE_STD),
         jnp.full((3, 3, 4), log_viscosity_std),
         *object_deviations(scene),
-        outlet_deviations(scene),
     )
     leaving = None if balanced is None else leaving_excess_k(problem)
     return Prior(
@@ -200,13 +195,6 @@ def looked_through(scene: Scene) -> tuple[WallName, WallName] | None:
     """The two walls at the ends of the only axis that cameras look along; None where they look along several."""
     axes = looked_along(scene)
     return (WALLS[2 * axes[0]], WALLS[2 * axes[0] + 1]) if len(axes) == 1 else None
-
-
-def outlet_deviations(scene: Scene) -> Float[Array, " outlets"]:
-    """Of the logarithm of what leaves by each outlet beside the first one; 0 where any outlet's flow is stated."""
-    outlets = [part for part in scene.boundary if isinstance(part, Outlet)]
-    open_to_fit = all(outlet.flow_m3_s is None for outlet in outlets)
-    return _f32([_OUTLET_STD * float(open_to_fit and n > 0) for n in range(len(outlets))])
 
 
 def object_means(scene: Scene) -> tuple[Array, Array, Array]:

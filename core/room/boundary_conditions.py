@@ -35,7 +35,6 @@ class RoomParameters(eqx.Module):
     [m/s]; `log_heat` is a factor on those of all walls. `log_closure` is a factor on the eddy viscosity, and
     `log_viscosity` one that varies over the room on a coarse lattice. An object of stated power has `object_power_w`;
     one of stated temperature `object_excess_k` and the heat coefficient `object_log_heat` [m/s].
-    `outlet_log_share` is a factor on what leaves by an outlet, before all outlets share what comes in.
     """
 
     inlet_excess_k: Float[Array, " inlets"]
@@ -50,16 +49,15 @@ class RoomParameters(eqx.Module):
     object_power_w: Float[Array, " objects"] = eqx.field(default_factory=lambda: jnp.zeros(0))
     object_excess_k: Float[Array, " objects"] = eqx.field(default_factory=lambda: jnp.zeros(0))
     object_log_heat: Float[Array, " objects"] = eqx.field(default_factory=lambda: jnp.zeros(0))
-    outlet_log_share: Float[Array, " outlets"] = eqx.field(default_factory=lambda: jnp.zeros(0))
 
 
 class RoomLayout(eqx.Module):
     """Where openings and heaters are, what is stated about them, and sentences on what the grid cannot hold.
 
-    `outlet_shares`: of the air that leaves, the share that leaves by each outlet, as stated. `shown`: whether
-    vertices on a heater get its temperature. `heated`, `no_slip`, `held`: of each wall, 1 if heat passes it, if air
-    sticks to it, and if its temperature is stated. `own`: 1 if its vertices show its own temperature and not the
-    air's: a stated one, and a fitted one where a camera looks through the wall or at it.
+    `outlet_shares`: of the air that leaves, the share that leaves by each outlet. `shown`: whether vertices on a
+    heater get its temperature. `heated`, `no_slip`, `held`: of each wall, 1 if heat passes it, if air sticks to it,
+    and if its temperature is stated. `own`: 1 if its vertices show its own temperature and not the air's: a stated
+    one, and a fitted one where a camera looks through the wall or at it.
     `solids` are the objects in the room, and `objects` those of the scene; None and empty where there are none.
     """
 
@@ -87,11 +85,6 @@ class RoomLayout(eqx.Module):
         )
         area = np.array([o.area_m2 for o in self.inlets])
         return jnp.asarray(normal * area, jnp.float32) * jnp.exp(parameters.inlet_log_flow)
-
-    def leaving_shares(self, parameters: RoomParameters) -> Float[Array, " outlets"]:
-        """Of the air that leaves, the share that leaves by each outlet."""
-        parts = jnp.asarray(self.outlet_shares, jnp.float32) * jnp.exp(parameters.outlet_log_share)
-        return parts / jnp.maximum(parts.sum(), 1e-12)
 
 
 def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
@@ -158,8 +151,8 @@ def boundary(layout: RoomLayout, parameters: RoomParameters) -> Boundary:
     inflow = layout.inflow_m3_s(parameters)
     for n, opening in enumerate(layout.inlets):
         planes[opening.wall] = _with_inlet(planes[opening.wall], layout, n, parameters)
-    for opening, share in zip(layout.outlets, layout.leaving_shares(parameters), strict=True):
-        speed = inflow.sum() / opening.area_m2 * share
+    for opening, share in zip(layout.outlets, layout.outlet_shares, strict=True):
+        speed = inflow.sum() / opening.area_m2 * float(share)
         fraction = jnp.asarray(opening.fraction, jnp.float32)
         wall = planes[opening.wall]
         planes[opening.wall] = eqx.tree_at(

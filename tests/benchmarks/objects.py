@@ -213,7 +213,6 @@ def _parameters(where: Room, power_w: float) -> RoomParameters:
         jnp.full(objects, power_w),
         jnp.zeros(objects),
         jnp.full(objects, np.log(2.5e-3)),
-        jnp.zeros(len(where.layout.outlets)),
     )
 
 

@@ -170,7 +170,7 @@ def test_of_several_outlets_each_may_have_its_flow(station: Station, opens: Open
     page = opens(station.address).page
     page.get_by_role("button", name="New experiment").click()
     page.get_by_role("radio", name=re.compile("packaged room")).check()
-    flows = page.get_by_label("Flow (empty: unknown)")
+    flows = page.get_by_label("Flow (empty: by area)")
     expect(page.get_by_role("group", name="outlet 1").first).to_be_visible()
     expect(flows).to_have_count(0)
     page.get_by_role("button", name="Add outlet").click()

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.estimate.diagnostics import contradictions, misfit, other_way, outlets_found
+from core.estimate.diagnostics import contradictions, misfit, other_way
 from core.estimate.discrepancy import temperature_correction
 from core.estimate.explained import explained, likeness
 from core.estimate.least_squares import Posterior
@@ -17,9 +17,8 @@ from core.known import leaving_excess_k
 from core.motion import CameraMotion
 from core.problem import Problem, ShiftMeasurement
 from core.room.boundary_conditions import SuspectedHeater
-from core.room.forward import room
 from core.room.vertices import RoomFields
-from core.scene import Outlet, Patch
+from core.scene import Patch
 from tests.core.estimate.test_temperature_levels import prior_of, problem
 
 VERTICES = (8, 8, 8)
@@ -181,32 +180,6 @@ def test_a_camera_that_moved_by_far_more_than_the_air_did_makes_no_temperature(s
 
     # Of 4 K.
     assert np.abs(found.excess_k).max() < 0.05
-
-
-def test_what_leaves_by_an_outlet_is_told_with_its_interval():
-    given = problem(stated=True)
-    high = Outlet(patch=Patch(wall="z_max", lower_m=(0.7, 0.4), upper_m=(1.3, 0.6)))
-    both = Problem(replace(given.scene, boundary=(*given.scene.boundary, high)), ())
-    layout = room(both.scene, 8, "constant").layout
-    prior = prior_of(both)
-    own = prior.names().index("outlet_log_share[1]")
-    vector, covariance = np.zeros(len(prior.names())), 0.01 * np.eye(len(prior.names()))
-    by_model = np.zeros(len(vector))
-    # Three times what leaves by the first, which is as large: 1.57 deviations of 0.7.
-    vector[own] = np.log(3.0) / 0.7
-
-    posterior, parameters = Posterior(vector, covariance, np.zeros(0)), prior.parameters(vector)
-    said = outlets_found(layout, prior, posterior, parameters, by_model)
-    less_sure = outlets_found(layout, prior, posterior, parameters, by_model + 0.5)
-
-    # Of the ratio's logarithm 0.137 either way, or 0.70.
-    of = "By outlet 2, on z_max, 75 % of the air leaves (95 %: {}); by the outlets' areas it would be 50 %."
-    assert said == [of.format("72 to 77 %")]
-    assert less_sure == [of.format("60 to 86 %")]
-    alone = room(given.scene, 8, "constant").layout
-    stated = np.zeros(len(prior_of(given).names()))
-    found = Posterior(stated, np.eye(len(stated)), np.zeros(0))
-    assert outlets_found(alone, prior_of(given), found, prior_of(given).parameters(stated), stated) == []
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

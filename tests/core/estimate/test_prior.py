@@ -10,7 +10,7 @@ from core.estimate.forward_runs import Derivatives
 from core.geometry import WALLS
 from core.problem import Problem
 from core.room.vertices import RoomFields
-from core.scene import FlowModel, Outlet, Patch, Wall
+from core.scene import FlowModel, Wall
 from tests.core.estimate.test_temperature_levels import VERTICES, prior_of, problem
 
 
@@ -49,25 +49,6 @@ def test_where_one_of_them_is_stated_the_other_is_fitted_alone(known: str):
     assert f"wall_excess_k[{WALLS.index(known)}]" not in prior.names()
     assert found[WALLS.index(known)] == pytest.approx(-3.0, abs=1e-3)
     assert "as one" not in undetermined(given)[0]
-
-
-@pytest.mark.parametrize(
-    ("flows_m3_s", "fitted"), [((None, None), True), ((0.05, None), False), ((0.05, 0.1), False)]
-)
-def test_what_leaves_by_each_outlet_is_fitted_where_nobody_states_any_flow(flows_m3_s, fitted: bool):
-    given = problem(stated=True)
-    (one,) = (part for part in given.scene.boundary if isinstance(part, Outlet))
-    other = Outlet(patch=Patch(wall="z_max", lower_m=(0.5, 0.5), upper_m=(0.9, 0.9)))
-    rest = tuple(part for part in given.scene.boundary if part is not one)
-    both = (replace(part, flow_m3_s=flow) for part, flow in zip((one, other), flows_m3_s, strict=True))
-    prior = prior_of(Problem(replace(given.scene, boundary=(*rest, *both)), ()))
-
-    names = [name for name in prior.names() if name.startswith("outlet")]
-
-    # Beside the first: of two outlets one number tells both.
-    assert names == (["outlet_log_share[1]"] if fitted else [])
-    assert "outlet_log_share[0]" not in prior_of(given).names()
-    assert dict(zip(prior.names(), prior.gaussian(), strict=True)).get("outlet_log_share[1]", True)
 
 
 def test_unknown_walls_are_not_let_go():

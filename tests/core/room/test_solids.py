@@ -63,7 +63,6 @@ def parameters(of: Room, power_w: float, heat_m_s: float = 0.0) -> RoomParameter
         jnp.full(count, power_w),
         jnp.zeros(count),
         jnp.full(count, np.log(2.5e-3)),
-        jnp.zeros(len(of.layout.outlets)),
     )
 
 
