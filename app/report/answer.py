@@ -20,7 +20,8 @@ from core.significance import EITHER_WAY
 _PIXELS, _FRAMES = 2000, 100
 # Words of every sentence that bids distrust of a whole result. Swapped pictures explain the rest, so they come first.
 _DOUBTS = ("may be swapped", "distrust")
-# Words of every sentence that sends people to look at the room or an entry. What is missing may explain the latter.
+# Words of every sentence that sends people to look at the room or an entry. Heat that is missing may explain a wrong
+# entry, so it comes first.
 _CHECKS = ("State it as a heater", "Look for a source", "Check it", "is not as stated")
 
 
@@ -176,7 +177,7 @@ def doubts(sentences: Iterable[str]) -> tuple[str, ...]:
 
 
 def checks(sentences: Iterable[str]) -> tuple[str, ...]:
-    """Of what a result says, what is to be looked at in the room or among the entries, but what bids distrust."""
+    """Of what a result says, what is to be looked at in the room or among the entries, without what `doubts` has."""
     said = tuple(sentences)
     return tuple(one for one in _picked(said, _CHECKS) if one not in doubts(said))
 
