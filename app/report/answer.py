@@ -177,9 +177,8 @@ def doubts(sentences: Iterable[str]) -> tuple[str, ...]:
 
 
 def checks(sentences: Iterable[str]) -> tuple[str, ...]:
-    """Of what a result says, what is to be looked at in the room or among the entries, without what `doubts` has."""
-    said = tuple(sentences)
-    return tuple(one for one in _picked(said, _CHECKS) if one not in doubts(said))
+    """Of what a result says, what is to be looked at in the room or among the entries, missing heat first."""
+    return _picked(sentences, _CHECKS)
 
 
 def _picked(sentences: Iterable[str], words: Sequence[str]) -> tuple[str, ...]:

@@ -115,8 +115,8 @@ def march(
     outcome = None
     while outcome is None:
         if state.model_s >= settings.longest_s - 1e-6 or state.steps >= settings.most_steps:
-            still = Outcome.step_limit if state.steps >= settings.most_steps else Outcome.unsteady
-            outcome = Outcome.converged if state.change < settings.settled else still
+            changing = Outcome.step_limit if state.steps >= settings.most_steps else Outcome.unsteady
+            outcome = Outcome.converged if state.change < settings.settled else changing
             break
         state, outcome = _after_window(state, model, settings, check_stop)
         on_window(state)

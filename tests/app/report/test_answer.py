@@ -42,5 +42,3 @@ def test_what_is_to_be_looked_at_comes_from_what_the_fit_says_heat_before_entrie
 
     assert heat
     assert checks(said) == (*heat, gone, entry, level)
-    # What bids distrust of all stands before the answer, and is not said twice.
-    assert checks(other_way(-0.8)) == ()
