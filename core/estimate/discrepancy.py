@@ -1,10 +1,11 @@
 """Model discrepancy in T: a smooth correction of the temperature for what no parameter explains.
 
-    T <- T + sum c_ij b_i(x) b_j(z),   c ~ normal(0, K),   linear least squares on the last residual
+    T <- T + sum_k c_k b_k(z) + sum_a sum_ij c_aij b_i b_j,   c ~ normal(0, K)
 
-The correction is constant along y, the direction of view, since one view sees only the mean along its rays.
-K has three parts: errors of the profile over height, local errors in the x-z section, and an error of the
-level (the mean). Images do not see the level; thermometers do (a plane, outlets, sensors). A plane on a wall
+Linear least squares on the last residual. The first sum is an error of the profile over height, which holds that of
+the level (the mean). The second has one part for each axis a that a view looks along, and is constant along it, since
+a view sees only means along its rays: a view of y_max tells b_i(x) b_j(z), one of x_max b_i(y) b_j(z).
+Images do not see the level; thermometers do (a plane, outlets, sensors). A plane on a wall
 of unknown temperature lies in that wall's thermal layer, which the model may have wrong by one constant: that
 constant is estimated too. Walls of stated temperature keep it. The errors that the windows of a picture share, such
 as what the camera may have done, are marginalised. The velocity is not corrected.
@@ -29,31 +30,36 @@ from core.estimate.least_squares import spread
 from core.estimate.observation import IMAGES, OUTLETS, PLANES, SENSORS, Observations, ShiftBlocks
 from core.geometry import face_of
 from core.room.vertices import linear_matrix
+from core.scene import Scene
+from core.view_frame import looked_along
 
-# So many neighbouring data count as one. Fewer than in the fit of the parameters (`core.data_error`): what
+# So many neighbouring data count as one. Fewer than in the fit of the parameters (`Observations.alike`): what
 # neighbours have wrong in common is what the correction is to take up.
 _CORRELATED = 4.0
-# Basis functions along x and z.
-_LATTICE = (9, 11)
-# Of K's variance: errors of the profile over height, and local errors.
+# Basis functions along x, y and z.
+_LATTICE = (9, 9, 11)
+# Of the variance of what one view sees: errors of the profile over height, and local errors.
 _PROFILE_PART, _LOCAL_PART = 0.7, 0.3
-# An error of T is correlated along y as along x and z: of its variance the mean along y keeps this share.
+# An error of T is as short along a view as across it: of its variance the mean along the view keeps this share.
 _SEEN_SHARE = alike_share(1)
+
+# Numbers of basis functions along x, y and z of a part of the correction: one along an axis is a constant.
+_Part = tuple[int, int, int]
 # Standard deviation of the layer of a plane on a wall of unknown temperature, as a share of the rms departure of T
 # from its mean at each height.
 _LAYER_SHARE = 1.0
 
 
 class Correction(eqx.Module):
-    """The correction on vertices, and its prior and posterior variance; all constant along y.
+    """The correction on vertices, and its prior and posterior variance; one vertex along an axis without change.
 
-    `point_k2` is the variance of one point about the mean along y. `level_std_k` is the posterior deviation of the
+    `point_k2` is the variance of one point about what views see. `level_std_k` is the posterior deviation of the
     mean over the room.
     """
 
-    excess_k: Float[np.ndarray, "vx vz"]
-    prior_variance_k2: Float[np.ndarray, "vx vz"]
-    variance_k2: Float[np.ndarray, "vx vz"]
+    excess_k: Float[np.ndarray, "vx vy vz"]
+    prior_variance_k2: Float[np.ndarray, "vx vy vz"]
+    variance_k2: Float[np.ndarray, "vx vy vz"]
     point_k2: float
     level_std_k: float
 
@@ -62,7 +68,7 @@ class _Residuals(eqx.Module):
     """Residuals of one kind, derivatives in the coefficients and the planes' layers, and errors that they share.
 
     `start` is the kind's error beyond noise from which the search begins; None: thermometers, which read one point
-    where the correction is a mean along y.
+    where the correction is a mean along a view.
     """
 
     residual: Float[np.ndarray, " data"]
@@ -96,39 +102,81 @@ def temperature_correction(
     `wrong_share`, known to a factor e; `level_std_k` is the prior standard deviation of the level; `outlet_std_k` is
     how far what leaves may be, in the model, from the air at the outlet's height.
     """
-    nx, _, nz = excess_k.shape
-    along_x, along_z = (
-        linear_matrix(np.linspace(0, 1, m), np.linspace(0, 1, n))
-        for m, n in zip(_LATTICE, (nx, nz), strict=True)
-    )
-    basis = np.einsum("xi,zj->ijxz", along_x, along_z).reshape(-1, nx, nz)
-    kinds = _kinds(data, excess_k, residual, basis, unknown_walls, outlet_std_k)
+    parts = _parts(data.scene)
+    bases = [_basis(part, excess_k.shape) for part in parts]
+    kinds = _kinds(data, excess_k, residual, parts, bases, unknown_walls, outlet_std_k)
     layers = sum(plane.wall in unknown_walls for plane in data.planes)
     layer_k2 = np.eye(layers) * (_LAYER_SHARE * departure_k) ** 2
 
     def prior_k2(std_k: float) -> np.ndarray:
-        return np.asarray(block_diag(_prior_k2(std_k) + level_std_k**2, layer_k2))
+        profile, *local = (std_k**2 * _prior_share(part) for part in parts)
+        return np.asarray(block_diag(profile + level_std_k**2, *local, layer_k2))
 
-    std_k, errors = _sizes(kinds, prior_k2, wrong_share * departure_k * float(np.sqrt(_SEEN_SHARE)))
-    prior = prior_k2(std_k)
-    fitted = _fit(kinds, prior, errors, _point_k2(std_k))
-    size = len(basis)
-    before, after = (
-        np.einsum("ixz,ixz->xz", basis, np.tensordot(c[:size, :size], basis, axes=1))
-        for c in (prior, fitted.covariance)
+    std_k, errors = _sizes(
+        kinds, prior_k2, _unseen_share(parts), wrong_share * departure_k * float(np.sqrt(_SEEN_SHARE))
     )
-    level = basis.mean((1, 2))
+    prior, point_k2 = prior_k2(std_k), _unseen_share(parts) * std_k**2
+    fitted = _fit(kinds, prior, errors, point_k2)
+    size = sum(len(basis) for basis in bases)
+    before, after = (_variance(bases, c[:size, :size]) for c in (prior, fitted.covariance))
+    level = np.concatenate([basis.mean((1, 2, 3)) for basis in bases])
     level_std_k = float(np.sqrt(level @ fitted.covariance[:size, :size] @ level))
-    return Correction(
-        np.tensordot(fitted.mean[:size], basis, axes=1), before, after, _point_k2(std_k), level_std_k
+    return Correction(_field(bases, fitted.mean[:size]), before, after, point_k2, level_std_k)
+
+
+def _parts(scene: Scene) -> list[_Part]:
+    """The profile over height, and what is local, for each axis that a view looks along."""
+    profile: _Part = (1, 1, _LATTICE[2])
+    return [profile, *(_across(axis) for axis in looked_along(scene))]
+
+
+def _across(axis: int) -> _Part:
+    nx, ny, nz = (1 if a == axis else n for a, n in enumerate(_LATTICE))
+    return nx, ny, nz
+
+
+def _unseen_share(parts: list[_Part]) -> float:
+    """Variance of a point about what the parts hold of it, over that of what one view sees."""
+    return 1.0 / _SEEN_SHARE - _PROFILE_PART - _LOCAL_PART * (len(parts) - 1)
+
+
+def _basis(part: _Part, shape: tuple[int, int, int]) -> Float[np.ndarray, "functions vx vy vz"]:
+    """A part's basis functions on vertices; one vertex along an axis where it is constant."""
+    x, y, z = (
+        _hats(n, np.linspace(0, 1, vertices if n > 1 else 1)) for n, vertices in zip(part, shape, strict=True)
     )
+    return np.einsum("xi,yj,zk->ijkxyz", x, y, z).reshape(-1, len(x), len(y), len(z))
+
+
+def _hats(count: int, share: Float[np.ndarray, " points"]) -> Float[np.ndarray, "points functions"]:
+    """Piecewise linear functions along an axis, at places from 0 to 1; one of them is a constant."""
+    return np.ones((len(share), 1)) if count == 1 else linear_matrix(np.linspace(0, 1, count), share)
+
+
+def _field(
+    bases: list[Float[np.ndarray, "functions _ _ _"]], coefficients: Float[np.ndarray, " unknowns"]
+) -> Float[np.ndarray, "vx vy vz"]:
+    """The correction with these coefficients."""
+    ends = np.cumsum([len(basis) for basis in bases])
+    parts = np.split(coefficients, ends[:-1])
+    return np.asarray(sum(np.tensordot(c, basis, axes=1) for c, basis in zip(parts, bases, strict=True)))
+
+
+def _variance(
+    bases: list[Float[np.ndarray, "functions _ _ _"]], covariance: Float[np.ndarray, "unknowns unknowns"]
+) -> Float[np.ndarray, "vx vy vz"]:
+    """Variance of the correction at vertices, from the covariance of its coefficients."""
+    values, vectors = np.linalg.eigh(covariance)
+    roots = (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    return np.asarray(sum(np.square(_field(bases, root)) for root in roots))
 
 
 def _kinds(
     data: Observations,
     excess_k: Float[np.ndarray, "vx vy vz"],
     residual: Float[np.ndarray, " data"],
-    basis: Float[np.ndarray, "lattice vx vz"],
+    parts: list[_Part],
+    bases: list[Float[np.ndarray, "functions _ _ _"]],
     unknown_walls: Collection[str],
     outlet_std_k: float,
 ) -> list[_Residuals]:
@@ -137,13 +185,13 @@ def _kinds(
     layers, shared = _layer_design(data, unknown_walls), _shared_errors(data)
     own_errors = data.unshared(residual, variance)
     found = []
-    for g, design in (
-        (IMAGES, _shift_design(data, excess_k, basis)),
-        (PLANES, _plane_design(data, excess_k, basis)),
-        (SENSORS, _sensor_design(data)),
-        (OUTLETS, _outlet_design(data)),
+    for g, designs in (
+        (IMAGES, [_shift_design(data, excess_k, basis) for basis in bases]),
+        (PLANES, [_plane_design(data, excess_k, basis) for basis in bases]),
+        (SENSORS, [_sensor_design(data, part) for part in parts]),
+        (OUTLETS, [_outlet_design(data, part) for part in parts]),
     ):
-        own = group == g
+        own, design = group == g, np.concatenate(designs, axis=1)
         if own.any():
             extra = layers if g == PLANES else np.zeros((len(design), layers.shape[1]))
             unknowns = np.concatenate([design, extra], axis=1)
@@ -157,9 +205,11 @@ def _kinds(
 
 
 def _sizes(
-    kinds: list[_Residuals], prior_k2: Callable[[float], np.ndarray], expected_k: float
+    kinds: list[_Residuals], prior_k2: Callable[[float], np.ndarray], unseen: float, expected_k: float
 ) -> tuple[float, list[float]]:
-    """The correction's standard deviation, and each pooled kind's error.
+    """The standard deviation of what one view sees of the correction, and each pooled kind's error.
+
+    `unseen` is the variance of a point about the correction, over that deviation's square.
 
     The errors are those under which the residuals are most likely. The correction's variance is the mean over all
     that the residuals leave possible: where they say little it stays wide.
@@ -168,7 +218,7 @@ def _sizes(
 
     def loss(logs: np.ndarray) -> float:
         std_k, errors = expected_k * np.exp(logs[0]), starts * np.exp(logs[1:])
-        fitted = _fit(kinds, prior_k2(std_k), list(errors), _point_k2(std_k))
+        fitted = _fit(kinds, prior_k2(std_k), list(errors), unseen * std_k**2)
         return 0.5 * logs[0] ** 2 - fitted.log_evidence
 
     first = np.zeros(1 + len(starts))
@@ -214,11 +264,6 @@ def _fit(
     return _Fitted(mean, covariance, -0.5 * unlikely)
 
 
-def _point_k2(std_k: float) -> float:
-    """Variance of a point about the mean along y, where that mean has the standard deviation `std_k`."""
-    return float((1.0 / _SEEN_SHARE - 1.0) * std_k**2)
-
-
 def _layer_design(data: Observations, unknown_walls: Collection[str]) -> Float[np.ndarray, "data layers"]:
     """Derivative of the planes' blocks in the layer constant of each plane on an unknown wall."""
     blocks = data.plane_blocks()
@@ -232,29 +277,28 @@ def _shared_errors(data: Observations) -> Float[np.ndarray, "shifts errors"]:
     return np.asarray(block_diag(*columns)) if columns else np.zeros((0, 0))
 
 
-def _prior_k2(std_k: float) -> Float[np.ndarray, "lattice lattice"]:
-    """Covariance K without its level: 0.7 of it depends on height alone, 0.3 is local."""
-    x, z = (np.linspace(0, 1, m) for m in _LATTICE)
-    near_x = np.exp(-np.abs(x[:, None] - x[None, :]) / LENGTH_SHARE)
-    near_z = np.exp(-np.abs(z[:, None] - z[None, :]) / LENGTH_SHARE)
-    size = len(x) * len(z)
-    kernel = _PROFILE_PART * np.ones_like(near_x)[:, None, :, None] + _LOCAL_PART * near_x[:, None, :, None]
-    covariance = (kernel * near_z[None, :, None, :]).reshape(size, size)
-    return std_k**2 * (covariance + 1e-6 * np.eye(size))
+def _prior_share(part: _Part) -> Float[np.ndarray, "functions functions"]:
+    """Covariance of a part's coefficients, over the variance of what one view sees."""
+    share = np.ones((1, 1))
+    for count in part:
+        place = np.linspace(0, 1, count)
+        share = np.kron(share, np.exp(-np.abs(place[:, None] - place[None, :]) / LENGTH_SHARE))
+    local = sum(count > 1 for count in part) > 1
+    return (_LOCAL_PART if local else _PROFILE_PART) * share + 1e-6 * np.eye(len(share))
 
 
-def _sensor_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
+def _sensor_design(data: Observations, part: _Part) -> Float[np.ndarray, "data functions"]:
     """Derivative of the sensors' temperatures in every coefficient."""
     points = [s.position_m[np.isfinite(s.temperature_k)] for s in data.sensors]
-    return _at_points(data, np.concatenate([np.zeros((0, 3)), *points]))
+    return _at_points(data, part, np.concatenate([np.zeros((0, 3)), *points]))
 
 
-def _outlet_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
-    """Derivative of the outlets' temperatures in every coefficient, as the mean over x at the outlet's height.
+def _outlet_design(data: Observations, part: _Part) -> Float[np.ndarray, "data functions"]:
+    """Derivative of the outlets' temperatures in every coefficient, as the mean at the outlet's heights.
 
     Windows beside walls are left out, so the correction at the outlet's own wall is an extrapolation only.
     """
-    rows = [np.zeros((0, _LATTICE[0] * _LATTICE[1]))]
+    rows = [np.zeros((0, int(np.prod(part))))]
     for _, outlet, _ in data.outlets:
         patch, face = outlet.patch, face_of(outlet.patch.wall)
         box, (first, second) = data.scene.room, face.along
@@ -263,33 +307,32 @@ def _outlet_design(data: Observations) -> Float[np.ndarray, "data lattice"]:
         points[..., face.axis] = face.place_m(box)
         points[..., first] = (patch.lower_m[0] + steps * (patch.upper_m[0] - patch.lower_m[0]))[:, None]
         points[..., second] = (patch.lower_m[1] + steps * (patch.upper_m[1] - patch.lower_m[1]))[None, :]
-        row = _at_points(data, points.reshape(-1, 3)).mean(axis=0).reshape(_LATTICE)
-        rows.append(np.broadcast_to(row.sum(0) / _LATTICE[0], _LATTICE).reshape(1, -1))
+        row = _at_points(data, part, points.reshape(-1, 3)).mean(axis=0).reshape(part)
+        rows.append(np.broadcast_to(row.mean((0, 1)), part).reshape(1, -1))
     return np.concatenate(rows)
 
 
 def _at_points(
-    data: Observations, points_m: Float[np.ndarray, "points 3"]
-) -> Float[np.ndarray, "points lattice"]:
-    """The basis functions at points."""
+    data: Observations, part: _Part, points_m: Float[np.ndarray, "points 3"]
+) -> Float[np.ndarray, "points functions"]:
+    """A part's basis functions at points."""
     box = data.scene.room
-    share = (points_m - np.asarray(box.lower_m)) / np.asarray(box.size_m)
-    x, z = (
-        linear_matrix(np.linspace(0, 1, m), np.clip(share[:, a], 0.0, 1.0))
-        for a, m in zip((0, 2), _LATTICE, strict=True)
-    )
-    return np.einsum("pi,pj->pij", x, z).reshape(len(points_m), _LATTICE[0] * _LATTICE[1])
+    share = np.clip((points_m - np.asarray(box.lower_m)) / np.asarray(box.size_m), 0.0, 1.0)
+    x, y, z = (_hats(count, share[:, axis]) for axis, count in enumerate(part))
+    return np.einsum("pi,pj,pk->pijk", x, y, z).reshape(len(points_m), int(np.prod(part)))
 
 
 def _shift_design(
-    data: Observations, excess_k: Float[np.ndarray, "vx vy vz"], basis: Float[np.ndarray, "lattice vx vz"]
-) -> Float[np.ndarray, "blocks lattice"]:
-    """Derivative of the blocks' shifts in every coefficient."""
+    data: Observations,
+    excess_k: Float[np.ndarray, "vx vy vz"],
+    basis: Float[np.ndarray, "functions _ _ _"],
+) -> Float[np.ndarray, "blocks functions"]:
+    """Derivative of the blocks' shifts in every coefficient of a part."""
     air = data.scene.air
     slope = (
         -air.ambient_refractivity * air.ambient_temperature_k / (air.ambient_temperature_k + excess_k) ** 2
     )
-    fields = jnp.asarray(basis[:, :, None, :] * slope[None], jnp.float32)
+    fields = jnp.asarray(basis * slope[None], jnp.float32)
     columns = [
         np.stack([block.pooled(d).ravel() for d in _shifts(block, fields)], axis=1) for block in data.shifts
     ]
@@ -301,17 +344,18 @@ def _shift_design(
 
 
 def _shifts(
-    block: ShiftBlocks, fields: Float[jax.Array, "lattice vx vy vz"]
-) -> Float[np.ndarray, "lattice windows 2"]:
+    block: ShiftBlocks, fields: Float[jax.Array, "functions vx vy vz"]
+) -> Float[np.ndarray, "functions windows 2"]:
     run = eqx.filter_jit(lambda operator, many: jax.lax.map(operator.apply, many))
     return np.asarray(run(block.operator, fields))
 
 
 def _plane_design(
-    data: Observations, excess_k: Float[np.ndarray, "vx vy vz"], basis: Float[np.ndarray, "lattice vx vz"]
-) -> Float[np.ndarray, "blocks lattice"]:
-    """Derivative of the planes' blocks in every coefficient."""
+    data: Observations,
+    excess_k: Float[np.ndarray, "vx vy vz"],
+    basis: Float[np.ndarray, "functions _ _ _"],
+) -> Float[np.ndarray, "blocks functions"]:
+    """Derivative of the planes' blocks in every coefficient of a part."""
     if not data.planes:
         return np.zeros((0, len(basis)))
-    fields = np.broadcast_to(basis[:, :, None, :], (len(basis), *excess_k.shape))
-    return np.stack([data.plane_values(field) for field in fields], axis=1)
+    return np.stack([data.plane_values(np.broadcast_to(field, excess_k.shape)) for field in basis], axis=1)

@@ -49,8 +49,6 @@ class RoomSettings:
     `restart_walls_s`: as `restart_s`, where walls are unknown: jets answer slowly to a wall.
     `fine_step`: rounds end when no parameter moves by more.
     `wall_heat`: multiplies the walls' heat coefficient from the heat balance, or the nominal one.
-    `log_viscosity_std`: prior deviation of the eddy viscosity's logarithm over the room; None takes the
-    closure's (`core.estimate.prior`).
     """
 
     cells: int = 48
@@ -65,7 +63,6 @@ class RoomSettings:
     restart_walls_s: float = 180.0
     refine_s: float = 90.0
     use_images: bool = True
-    log_viscosity_std: float | None = None
     wall_heat: float = 1.0
     threads: int = 2
 

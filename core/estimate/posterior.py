@@ -71,10 +71,10 @@ def solution(
         analysis.data, analysis.prior, analysis.derivatives, fields, analysis.outlet_std_k
     )
     x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(fields.excess_k.shape))
-    change_k = change.excess_k[:, None, :] * free if use_images else np.zeros_like(free)
+    change_k = change.excess_k * free if use_images else np.zeros_like(free)
     moved_k = float(layer_means(change_k).mean())
     variances = change.prior_variance_k2, change.variance_k2
-    before, after = ((v[:, None, :] + (_DOUBT * moved_k) ** 2) * free for v in variances)
+    before, after = ((v + (_DOUBT * moved_k) ** 2) * free for v in variances)
     bent = hydrostatic_variance_m4_s4(problem, z, before), hydrostatic_variance_m4_s4(problem, z, after)
     shown_k = fields.excess_k + change_k
     surfaces_k = surfaces_std_k(

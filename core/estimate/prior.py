@@ -16,14 +16,17 @@ from jaxtyping import Array, Bool, Float
 
 from core.air import Air
 from core.estimate.balance import (
+    HEATER_HEAT_M_S,
     free_walls_k,
     heat_balance_m_s,
     supply_m3_s,
+    walls_lose_k_m2,
 )
 from core.geometry import WALLS, WallName
 from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
 from core.room.boundary_conditions import RoomLayout, RoomParameters, SuspectedHeater
+from core.room.forward import closure_name
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.scene import Heater, Inlet, Scene
 from core.view_frame import looked_along
@@ -36,8 +39,8 @@ _SHARED_HEAT_STD = 0.3
 # contrast. Whatever the supply, an outer wall of 0.5 W/m2K is 1.3 K from the air in 20 K of frost, by the surface
 # resistance of ISO 6946 (0.13 m2K/W).
 _WALL_SHARE, _LEAST_WALL_SHARE, _LEAST_WALL_K = 1.0, 0.2, 1.3
-# Heat coefficient of a heater [m/s], 3 W/m2K over rho c, and one sigma of its logarithm.
-_HEATER_HEAT_M_S, _HEATER_HEAT_STD = 2.5e-3, 0.6
+# One sigma of the logarithm of a heater's heat coefficient.
+_HEATER_HEAT_STD = 0.6
 # A freely fitted viscosity would absorb every other error and make the velocity worse: k-epsilon's is kept close.
 _CLOSURE_STD, _SIMPLE_CLOSURE_STD = 0.12, 0.25
 # No room has one viscosity everywhere. If one is asked for without a value, it is fitted as a coarse lattice, within
@@ -50,14 +53,15 @@ _LEAST_SHARE_T, _LEAST_SHARE_U = 0.02, 0.03
 class Prior(eqx.Module):
     """Mean and standard deviation of every parameter; a parameter of zero deviation is not fitted.
 
-    If the walls' heat coefficient comes from the heat balance (`leaving_excess_k` is not None), it follows the
-    supply's parameters, so that the balance with the measured outflow temperature holds.
+    If the walls' heat coefficient comes from the heat balance (`lost_k_m2` is not None, see `walls_lose_k_m2`), it
+    follows the supply's parameters, so that the balance with the measured outflow temperature holds.
     """
 
     mean: RoomParameters
     std: RoomParameters
     supply_m3_s: Float[np.ndarray, " inlets"]
-    leaving_excess_k: float | None = eqx.field(static=True)
+    leaving_excess_k: float = eqx.field(static=True)
+    lost_k_m2: float | None = eqx.field(static=True)
     heat_capacity_j_m3_k: float = eqx.field(static=True, default=Air().heat_capacity_j_m3_k)
     # The walls that every camera looks through and onto, where all look along one axis.
     looked_through: tuple[WallName, WallName] | None = eqx.field(static=True, default=None)
@@ -95,21 +99,17 @@ class Prior(eqx.Module):
             near, far = (WALLS.index(wall) for wall in tied)
             walls = found.wall_excess_k.at[far].set(found.wall_excess_k[near])
             found = eqx.tree_at(lambda p: p.wall_excess_k, found, walls)
-        moved = found.wall_log_heat + self._balanced(found)
-        return eqx.tree_at(lambda p: p.wall_log_heat, found, moved)
+        return self.balanced(found)
 
-    def _balanced(self, found: RoomParameters) -> float:
-        """Logarithm of the heat that supply and objects bring beyond the outflow's, over the same as stated."""
-        if self.leaving_excess_k is None:
-            return 0.0
+    def balanced(self, found: RoomParameters) -> RoomParameters:
+        """These parameters with the walls' heat coefficient that closes their heat balance."""
+        if self.lost_k_m2 is None:
+            return found
         flow = self.supply_m3_s * np.exp(np.asarray(found.inlet_log_flow, float))
         brought = float(np.dot(flow, np.asarray(found.inlet_excess_k, float) - self.leaving_excess_k))
-        stated = float(
-            np.dot(self.supply_m3_s, np.asarray(self.mean.inlet_excess_k, float) - self.leaving_excess_k)
-        )
         brought += float(found.object_power_w.sum()) / self.heat_capacity_j_m3_k
-        stated += float(self.mean.object_power_w.sum()) / self.heat_capacity_j_m3_k
-        return float(np.log(np.clip(brought / stated, 0.25, 4.0))) if brought * stated > 0 else 0.0
+        heat = jnp.full_like(found.wall_log_heat, np.log(heat_balance_m_s(brought, self.lost_k_m2)))
+        return eqx.tree_at(lambda p: p.wall_log_heat, found, heat)
 
     def names(self) -> list[str]:
         """Names of the fitted parameters, such as 'inlet_excess_k[0]'."""
@@ -138,9 +138,12 @@ class Prior(eqx.Module):
 
 
 def room_prior(
-    problem: Problem, layout: RoomLayout, *, log_viscosity_std: float | None = None, wall_heat: float = 1.0
+    problem: Problem, layout: RoomLayout, closure: str | None = None, *, wall_heat: float = 1.0
 ) -> Prior:
-    """The prior of a problem; `wall_heat` multiplies the walls' heat coefficient."""
+    """The prior of a problem under a closure, or the scene's.
+
+    `wall_heat` multiplies the walls' heat coefficient.
+    """
     scene = problem.scene
     ambient = scene.air.ambient_temperature_k
     inlets = [b for b in scene.boundary if isinstance(b, Inlet)]
@@ -153,8 +156,7 @@ def room_prior(
         [0.0 if w is None or w.temperature_k is None else w.temperature_k - ambient for w in walls]
     )
     free = np.isin(WALLS, unknown_walls(scene))
-    balanced = None if free.any() else heat_balance_m_s(problem, layout, excess, wall_excess)
-    heat_m_s = NOMINAL_HEAT_M_S if balanced is None else balanced
+    lost = None if free.any() else walls_lose_k_m2(problem, layout, excess, wall_excess)
     own, apart_k = free_walls_k(problem, layout, excess, wall_excess)
     wall_excess = np.where(free, own, wall_excess)
     mean = RoomParameters(
@@ -162,17 +164,15 @@ def room_prior(
         jnp.zeros(len(inlets)),
         jnp.float32(np.log(wall_heat)),
         _f32(wall_excess),
-        jnp.full(6, np.log(heat_m_s)),
+        jnp.full(6, np.log(NOMINAL_HEAT_M_S)),
         _f32([h.temperature_k - ambient for h in heaters]),
-        jnp.full(len(heaters), np.log(_HEATER_HEAT_M_S)),
+        jnp.full(len(heaters), np.log(HEATER_HEAT_M_S)),
         jnp.float32(0.0),
         jnp.zeros((3, 3, 4)),
         *object_means(scene),
     )
-    simple = scene.flow.transport in ("given", "zero_equation")
-    if log_viscosity_std is None:
-        guessed = scene.flow.transport == "given" and scene.flow.viscosity_m2_s is None
-        log_viscosity_std = _GUESSED_VISCOSITY_STD if guessed else 0.0
+    closure = closure or closure_name(scene)
+    guessed = closure == "constant" and scene.flow.viscosity_m2_s is None
     std = RoomParameters(
         _f32([max(i.temperature_std_k, _LEAST_SHARE_T * contrast) for i in inlets]),
         _f32([max(i.velocity_std_m_s / s, _LEAST_SHARE_U) for i, s in zip(inlets, speed, strict=True)]),
@@ -181,14 +181,20 @@ def room_prior(
         jnp.zeros(6),
         _f32([h.temperature_std_k for h in heaters]),
         _f32([_HEATER_HEAT_STD * (not isinstance(h, SuspectedHeater)) for h in heaters]),
-        jnp.float32(_SIMPLE_CLOSURE_STD if simple else _CLOSURE_STD),
-        jnp.full((3, 3, 4), log_viscosity_std),
+        jnp.float32({"k_epsilon": _CLOSURE_STD, "molecular": 0.0}.get(closure, _SIMPLE_CLOSURE_STD)),
+        jnp.full((3, 3, 4), _GUESSED_VISCOSITY_STD * guessed),
         *object_deviations(scene),
     )
-    leaving = None if balanced is None else leaving_excess_k(problem)
-    return Prior(
-        mean, std, supply_m3_s(layout), leaving, scene.air.heat_capacity_j_m3_k, looked_through(scene)
+    prior = Prior(
+        mean,
+        std,
+        supply_m3_s(layout),
+        leaving_excess_k(problem) or 0.0,
+        lost,
+        scene.air.heat_capacity_j_m3_k,
+        looked_through(scene),
     )
+    return eqx.tree_at(lambda p: p.mean, prior, prior.balanced(mean))
 
 
 def looked_through(scene: Scene) -> tuple[WallName, WallName] | None:
@@ -203,7 +209,7 @@ def object_means(scene: Scene) -> tuple[Array, Array, Array]:
     return (
         _f32([item.power_w or 0.0 for item in scene.objects]),
         _f32([(item.temperature_k or ambient) - ambient for item in scene.objects]),
-        _f32([np.log(_HEATER_HEAT_M_S) for _ in scene.objects]),
+        _f32([np.log(HEATER_HEAT_M_S) for _ in scene.objects]),
     )
 
 

@@ -110,6 +110,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
     place = [
         [lay_patch(b.patch, scene.room, grid, notes) for b in kind] for kind in (inlets, outlets, heaters)
     ]
+    notes += _shared_cells(place[0], place[1])
     solids = lay_objects(scene.objects, grid, notes)
     for kind, opening in (*(("inlet", o) for o in place[0]), *(("outlet", o) for o in place[1])):
         _refuse_covered(kind, opening, solids, grid)
@@ -201,6 +202,16 @@ def _refuse_covered(kind: str, opening: Opening, solids: Solids | None, grid: Ro
         )
 
 
+def _shared_cells(inlets: list[Opening], outlets: list[Opening]) -> list[str]:
+    """A sentence for each supply that shares a cell's face with an outlet: in a face only their difference flows."""
+    shared = [i.wall for i in inlets for o in outlets if i.wall == o.wall and (i.fraction * o.fraction).any()]
+    return [
+        f"A supply and an outlet on {WALLS[wall]} share a cell: a part of the supply's air leaves where it comes in. "
+        "Use a finer grid."
+        for wall in shared
+    ]
+
+
 def _unlike_flows(scene: Scene) -> list[str]:
     """A sentence where all outlets' flows are stated, and are not what the supplies bring within their deviations."""
     flows_m3_s = [part.flow_m3_s for part in scene.boundary if isinstance(part, Outlet)]
@@ -253,19 +264,23 @@ def _with_inlet(plane: WallPlane, layout: RoomLayout, n: int, parameters: RoomPa
     inside = fraction > 0
     first, second = (a for a in AXES if a != opening.axis)
     normal = velocity[opening.axis]
-    lost = normal**2 * (fraction - fraction**2) / layout.grid.spacing_m[opening.axis]
+    flow_m_s = plane.normal_m_s + normal * fraction
+    # A face in part of the supply, or of several, carries their momentum by a mean speed that has less of it.
+    carried = normal**2 * fraction - (flow_m_s**2 - plane.normal_m_s**2)
+    # Where two supplies share a face, what they bring is mixed as they flow.
+    share = jnp.where(inside, normal * fraction / jnp.where(flow_m_s == 0.0, 1.0, flow_m_s), 0.0)
     # Speed scales k by its square and epsilon by its cube.
     gain = jnp.exp(parameters.inlet_log_flow[n])
     k, epsilon = (float(value) for value in layout.inlet_k_epsilon[n])
 
     def put(old: Float[Array, "..."], new: Float[Array, ""]) -> Float[Array, "..."]:
-        return jnp.where(inside, new, old)
+        return (1.0 - share) * old + share * new
 
     return WallPlane(
-        plane.normal_m_s + normal * fraction,
+        flow_m_s,
         (put(plane.tangent_m_s[0], velocity[first]), put(plane.tangent_m_s[1], velocity[second])),
         put(plane.inflow_excess_k, parameters.inlet_excess_k[n]),
-        plane.force_m_s2 + opening.inward * lost,
+        plane.force_m_s2 + opening.inward * carried / layout.grid.spacing_m[opening.axis],
         plane.conductance_m_s,
         plane.wall_excess_k,
         put(plane.turbulent_energy_m2_s2, k * gain**2),

@@ -81,9 +81,7 @@ def background_of(
     closure = closure or closure_name(problem.scene)
     coarse, fine = (room(problem.scene, n, closure) for n in (settings.coarse_cells, settings.cells))
     vertices = (settings.vertices, settings.vertices, settings.vertices)
-    prior = room_prior(
-        problem, coarse.layout, log_viscosity_std=settings.log_viscosity_std, wall_heat=settings.wall_heat
-    )
+    prior = room_prior(problem, coarse.layout, closure, wall_heat=settings.wall_heat)
     marches.expect(fit_work(coarse, fine, prior, settings))
     base = run_as_stated(coarse, prior, problem, settings, vertices, marches)
     flow = carried_over(base.flow.last, coarse.grid, fine.grid)

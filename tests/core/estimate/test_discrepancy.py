@@ -1,12 +1,17 @@
+from collections.abc import Sequence
+from dataclasses import replace
+
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from core.estimate.discrepancy import Correction, temperature_correction
 from core.estimate.observation import Observations, observations
 from core.estimate.posterior import hydrostatic_m2_s2, hydrostatic_variance_m4_s4
-from core.geometry import Box, looking_along_y
-from core.problem import PlaneData, Problem, SensorData
+from core.geometry import Box, Vector3, WallName, looking_along_y
+from core.problem import PlaneData, Problem, SensorData, ShiftMeasurement
 from core.scene import FixedTexture, Outlet, Patch, Scene, View
+from core.view_frame import turn_to
 
 VERTICES = (17, 13, 15)
 Y, Z = np.linspace(-1.0, 1.0, 25), np.linspace(0.0, 2.4, 25)
@@ -101,11 +106,67 @@ def test_a_room_that_thermometers_contradict_is_corrected_further_and_is_less_ce
     confirmed, contradicted = (corrected(data(sensors=(pole(k),)), 0.01) for k in (0.02, 1.0))
 
     # One point says less of the mean along y, which the correction is, than it is itself wrong.
-    share = np.polyfit(np.cos(np.pi * z_m / 2.4), contradicted.excess_k[8], 1)[0]
+    share = np.polyfit(np.cos(np.pi * z_m / 2.4), contradicted.excess_k[8, 0], 1)[0]
     assert 0.3 < share < 0.9
     assert confirmed.point_k2 < 4 * (0.1 * DEPARTURE_K) ** 2
     assert contradicted.point_k2 > 100 * confirmed.point_k2
     assert contradicted.variance_k2.mean() > 10 * confirmed.variance_k2.mean()
+
+
+AHEAD: dict[WallName, Vector3] = {
+    "y_max": (1.5, -8.0, 1.2),
+    "x_max": (0.0, -8.0, 1.2),
+    "z_max": (1.5, -8.0, 0.0),
+}
+
+
+def pictures(walls: Sequence[WallName], excess_k: np.ndarray) -> Observations:
+    """Views of these walls, each from 8 m before it, with a twentieth of their rms shift as noise."""
+    across_px = np.arange(4.0, 384.0, 8.0)
+    centres_px = np.stack(np.meshgrid(across_px, across_px), -1).reshape(-1, 2)
+    still_px, unit = np.zeros_like(centres_px), np.tile(np.eye(2), (len(centres_px), 1, 1))
+    nothing = tuple(ShiftMeasurement(centres_px, still_px, 1e8 * unit, 8) for _ in walls)
+    views = []
+    for wall in walls:
+        seen = looking_along_y(position_m=AHEAD[wall], width_px=384, height_px=384, focal_px=900.0)
+        views.append(View(name=wall, wall=wall, camera=turn_to(wall).back().optics(seen)))
+    scene = replace(data().scene, views=tuple(views))
+    refractivity = scene.air.excess_refractivity(jnp.asarray(excess_k, jnp.float32))
+    shifts = []
+    for n, block in enumerate(observations(Problem(scene, nothing), VERTICES).shifts):
+        shift_px = np.asarray(block.operator.apply(refractivity))
+        std_px = 0.05 * float(np.sqrt(np.mean(shift_px**2)))
+        shift_px = shift_px + std_px * np.random.default_rng(n).normal(size=shift_px.shape)
+        shifts.append(replace(nothing[n], displacement_px=shift_px, information_per_px2=unit / std_px**2))
+    return observations(Problem(scene, tuple(shifts)), VERTICES)
+
+
+WAVE_X, WAVE_Y, WAVE_Z = (
+    np.cos(np.pi * k * np.linspace(0.0, 1.0, n)) for k, n in zip((2, 1, 1), VERTICES, strict=True)
+)
+
+
+@pytest.mark.parametrize(
+    ("walls", "wave"),
+    [
+        (("y_max",), WAVE_X[:, None, None] * WAVE_Z),
+        (("x_max",), WAVE_Y[:, None] * WAVE_Z),
+        (("y_max", "x_max"), WAVE_X[:, None, None] * WAVE_Z + WAVE_Y[:, None] * WAVE_Z),
+        (("z_max",), WAVE_X[:, None, None] * WAVE_Y[:, None]),
+    ],
+)
+def test_what_views_see_is_corrected_along_whatever_axis_they_look(
+    walls: tuple[WallName, ...], wave: np.ndarray
+):
+    truth_k = PREDICTED_K + 0.5 * np.broadcast_to(wave, VERTICES)
+    seen, room = pictures(walls, truth_k), np.full(VERTICES, PREDICTED_K)
+    # The room as it is predicted shifts nothing: its air is even.
+    found = temperature_correction(seen, room, seen.values()[0], DEPARTURE_K, 0.1, 1.0)
+
+    wrong_k = PREDICTED_K + found.excess_k - truth_k
+    std_k = np.sqrt(found.variance_k2 + found.point_k2)
+    assert np.sqrt(np.mean(wrong_k**2)) < 0.5 * np.std(truth_k)
+    assert np.mean(np.abs(wrong_k) < 1.96 * std_k) > 0.9
 
 
 def test_without_data_nothing_moves_and_nothing_is_learnt():

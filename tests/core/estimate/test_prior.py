@@ -7,10 +7,14 @@ import pytest
 
 from core.estimate.diagnostics import undetermined
 from core.estimate.forward_runs import Derivatives
+from core.estimate.prior import room_prior
 from core.geometry import WALLS
+from core.objects import RoomObject
 from core.problem import Problem
+from core.room.forward import room
+from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.room.vertices import RoomFields
-from core.scene import FlowModel, Wall
+from core.scene import FlowModel, Heater, Inlet, Patch, Wall
 from tests.core.estimate.test_temperature_levels import VERTICES, prior_of, problem
 
 
@@ -101,3 +105,55 @@ def test_the_walls_heat_coefficient_closes_the_heat_balance():
     # 0.096 m3/s come in 5 K warmer than they leave; the air is 5 K above walls of 24 m2 without the openings.
     openings_m2 = 0.6 * 0.4 + 0.6 * 0.2
     assert heat_m_s == pytest.approx(0.096 * 5.0 / (5.0 * (24.0 - openings_m2)), rel=0.05)
+
+
+def test_the_walls_heat_coefficient_stays_within_its_limits_and_makes_no_jump_where_supplies_cancel():
+    given = with_walls(**dict.fromkeys(WALLS, 293.15))
+    warm, exhaust, *walls = given.scene.boundary
+    assert isinstance(warm, Inlet)
+    cold = replace(
+        warm, patch=Patch(wall="x_min", lower_m=(0.7, 1.6), upper_m=(1.3, 2.0)), temperature_k=284.15
+    )
+    outlet = replace(exhaust, mean_temperature_k=293.55)
+    scene = replace(given.scene, boundary=(warm, cold, outlet, *walls))
+    prior = prior_of(Problem(scene, ()))
+    own = prior.names().index("inlet_excess_k[0]")
+
+    steps = np.linspace(-8.0, 8.0, 81)
+    vectors = np.where(np.arange(len(prior.names())) == own, steps[:, None], 0.0)
+    heat = [float(np.exp(prior.parameters(v).wall_log_heat[0])) / NOMINAL_HEAT_M_S for v in vectors]
+
+    assert 0.2499 < min(heat) < max(heat) < 4.0001
+    # A step of 0.04 K of 10 in one supply.
+    assert np.abs(np.diff(heat)).max() < 1.0
+    assert heat[40] == pytest.approx(float(np.exp(prior.mean.wall_log_heat[0])) / NOMINAL_HEAT_M_S, rel=1e-4)
+
+
+def test_a_stated_heater_is_a_part_of_the_balance_that_unknown_walls_close():
+    given = problem(stated=False)
+    panel = Heater(patch=Patch(wall="z_min", lower_m=(0.5, 0.5), upper_m=(1.5, 1.5)), temperature_k=343.15)
+    body = RoomObject(
+        name="drum",
+        lower_m=(1.2, 1.2, 0.2),
+        upper_m=(1.7, 1.7, 0.7),
+        thermal="temperature",
+        temperature_k=343.15,
+    )
+    supply, exhaust = given.scene.boundary
+    bare = replace(given.scene, boundary=(supply, replace(exhaust, mean_temperature_k=302.15)))
+    rooms = bare, replace(bare, boundary=(*bare.boundary, panel)), replace(bare, objects=(body,))
+    without, heated, drum = (float(prior_of(Problem(r, ())).mean.wall_excess_k[0]) for r in rooms)
+
+    # The panel's 0.1 K m3/s go out by 24 m2 of wall at the nominal coefficient: 3 K.
+    assert heated < without - 2.0
+    assert drum < without - 2.0
+
+
+def test_a_viscosity_is_as_free_as_the_closure_that_is_marched_allows():
+    given = problem(stated=True)
+    layout = room(given.scene, 8, "k_epsilon").layout
+    names = "k_epsilon", "zero_equation", "molecular"
+    own, simple, none = (float(room_prior(given, layout, name).std.log_closure) for name in names)
+
+    assert 0.0 == none < own < simple
+    assert float(room_prior(given, layout).std.log_closure) == own

@@ -66,6 +66,36 @@ def test_openings_keep_their_flow_and_momentum_on_any_grid():
         assert momentum == pytest.approx(0.25 * patch_m2, rel=1e-5)
 
 
+@pytest.mark.parametrize("cells", [7, 12, 20])
+@pytest.mark.parametrize("cold_first", [False, True])
+def test_supplies_that_share_a_cells_face_bring_what_each_of_them_brings(cells: int, cold_first: bool):
+    cold = dataclasses.replace(
+        SUPPLY,
+        patch=Patch(wall="x_min", lower_m=(1.87, 1.5), upper_m=(2.4, 1.77)),
+        velocity_m_s=(0.3, 0.0, 0.0),
+    )
+    pair, excess_k = (SUPPLY, cold), jnp.array([10.0, -10.0])
+    if cold_first:
+        pair, excess_k = pair[::-1], excess_k[::-1]
+    grid = room_grid(ROOM, cells)
+    given = dataclasses.replace(parameters(2, 0), inlet_excess_k=excess_k)
+    low = boundary(room_layout(scene(*pair, EXHAUST), grid), given).walls[0][0]
+
+    area, areas_m2 = grid.face_area_m2(0), (0.74 * 0.27, 0.53 * 0.27)
+    heat = float((low.normal_m_s * low.inflow_excess_k).sum()) * area
+    assert heat == pytest.approx(10.0 * (0.5 * areas_m2[0] - 0.3 * areas_m2[1]), rel=1e-4)
+    momentum = float((low.normal_m_s**2).sum()) * area + float(low.force_m_s2.sum()) * grid.volume_m3
+    assert momentum == pytest.approx(0.25 * areas_m2[0] + 0.09 * areas_m2[1], rel=1e-4)
+
+
+def test_a_supply_that_shares_a_cells_face_with_an_outlet_is_told():
+    beside = Outlet(patch=Patch(wall="x_min", lower_m=(1.9, 1.5), upper_m=(2.4, 1.77)))
+    coarse, fine = (room_layout(scene(SUPPLY, beside), room_grid(ROOM, cells)).notes for cells in (7, 100))
+
+    assert any("share a cell" in note for note in coarse)
+    assert not any("share a cell" in note for note in fine)
+
+
 @pytest.mark.parametrize(
     ("low_m3_s", "high_m3_s", "low_share"),
     # The supply brings 0.0999 m3/s; the outlets' areas are 0.5 and 0.2 m2.
@@ -149,7 +179,7 @@ def test_a_free_surface_has_no_wall_function():
 def test_walls_heat_follows_a_supply_that_is_moved_so_that_the_thermometer_stays():
     walls = [Wall(wall=w, thermal="temperature", temperature_k=293.15) for w in ("x_max", "y_min", "y_max")]
     walls += [Wall(wall=w, thermal="adiabatic") for w in ("x_min", "z_min", "z_max")]
-    outlet = dataclasses.replace(EXHAUST, mean_temperature_k=297.15)
+    outlet = dataclasses.replace(EXHAUST, mean_temperature_k=298.15)
     problem = Problem(scene(SUPPLY, outlet, *walls), ())
     prior = room_prior(problem, room_layout(problem.scene, room_grid(ROOM, 8)))
     moved = np.zeros(len(prior.active()))
@@ -157,9 +187,9 @@ def test_walls_heat_follows_a_supply_that_is_moved_so_that_the_thermometer_stays
 
     stated, found = prior.parameters(np.zeros_like(moved)), prior.parameters(moved)
 
-    # The supply brings 10 - 4 K; moved, less by its ten deviations of 0.2 K.
+    # The supply brings 10 - 5 K; moved, less by its ten deviations of 0.2 K.
     gain = float(jnp.exp(found.wall_log_heat[1] - stated.wall_log_heat[1]))
-    assert gain == pytest.approx((10.0 - 2.0 - 4.0) / (10.0 - 4.0), rel=1e-4)
+    assert gain == pytest.approx((10.0 - 2.0 - 5.0) / (10.0 - 5.0), rel=1e-4)
 
 
 def test_a_room_with_jet_outlet_and_heater_marches_without_divergence():
