@@ -1,7 +1,7 @@
 """What a burst's own frames cannot tell: is it fit for this experiment's calibration and reference?
 
-Adds verdicts to those of the burst: the calibration's age and conditions, and for a flow whether its
-settings are the reference's and how far the still border moved since.
+Adds verdicts to those of the burst: a colour sensor's mosaic, the calibration's age and conditions, and for a flow
+whether its settings are the reference's and how far the still border moved since.
 """
 
 from dataclasses import replace
@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from app.capture.mosaic import judge_mosaic
 from app.errors import AirlensError
 from app.experiment.calibration import read_bundle
 from app.experiment.captures import MAX_SETTING_OFF, Capture, CapturePair, load_capture
@@ -31,6 +32,7 @@ def judged(experiment: Experiment, burst: Burst, told: Conditions = UNTOLD, view
         burst,
         verdicts=(
             *burst.verdicts,
+            *_mosaic(burst),
             *_calibration(experiment, told),
             *_against_reference(experiment, burst, view),
         ),
@@ -57,6 +59,11 @@ def aged(experiment: Experiment, captures: CapturePair) -> tuple[str, ...]:
         for text in calibration_warnings(experiment, capture.manifest["created"], known):
             found[f"The {capture.role} capture: {text}"] = None
     return tuple(found)
+
+
+def _mosaic(burst: Burst) -> tuple[Verdict, ...]:
+    """Whether the pattern's picture is as a colour sensor has it; of a dark or flat picture no shift is measured."""
+    return judge_mosaic(burst.mean) if burst.plan.role in ("reference", "flow") else ()
 
 
 def _calibration(experiment: Experiment, told: Conditions) -> list[Verdict]:

@@ -8,6 +8,7 @@ import pytest
 import tifffile
 
 from app.capture.imported import import_pictures
+from app.capture.mosaic import judge_mosaic
 from app.errors import BadInputError
 from app.experiment.captures import load_capture, newest_pair
 from app.experiment.folder import ExperimentSettings, create_experiment
@@ -102,6 +103,29 @@ def test_of_a_raw_file_the_green_is_taken_linear_from_black_to_white(experiment,
         # One of 65,535 counts, rounded.
         np.testing.assert_allclose(capture.images[0].mean[rows, columns], green.mean(0), atol=2e-5)
         np.testing.assert_allclose(capture.images[0].std[rows, columns], green.std(0, ddof=1), atol=2e-5)
+
+
+@pytest.mark.parametrize("colours", [(1.0, 1.0, 1.0, 1.0), (0.6, 1.0, 1.0, 0.5), (0.95, 1.0, 1.0, 1.0)])
+def test_a_raw_mosaic_is_told_from_a_grey_picture(experiment, tmp_path, colours):
+    for number, pixels in enumerate(frames()):
+        mosaic = pixels.astype(float)
+        for kind, part in enumerate(colours):
+            mosaic[kind // 2 :: 2, kind % 2 :: 2] *= part
+        tifffile.imwrite(tmp_path / f"{number:02}.tif", np.rint(mosaic).astype(np.uint16))
+    (one,) = import_pictures(experiment, {"reference": [str(tmp_path / "*.tif")]}, bits=12)
+    told = [verdict for verdict in one.burst.verdicts if verdict.name == "mosaic"]
+    assert bool(told) == (min(colours) < 1)
+    if told:
+        assert not told[0].good
+        assert "one colour" in told[0].advice
+
+
+@pytest.mark.parametrize("period_px", [2.1, 3, 4, 6, 8])
+def test_a_pattern_of_few_pixels_a_period_is_no_mosaic(period_px):
+    columns = np.arange(512) + 0.5
+    picture = np.tile(0.5 + 0.2 * np.cos(2 * np.pi * columns / period_px), (384, 1)).astype(np.float32)
+    assert not judge_mosaic(picture)
+    assert not judge_mosaic(pattern(384, 512))
 
 
 def test_without_rawpy_a_raw_file_says_what_to_install(experiment, tmp_path, monkeypatch):
