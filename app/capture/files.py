@@ -26,6 +26,8 @@ from drivers.protocols import CameraInfo, Frame, Pixels
 RAW_SUFFIXES = {".dng", ".nef", ".cr2", ".cr3", ".arw", ".raf", ".rw2", ".orf", ".pef"}
 LOSSY_SUFFIXES = {".jpg", ".jpeg"}
 LARGEST_PX = 400_000_000
+# Grey in the file's own bits, not turned by what the file says of how the camera was held: a calibration is not.
+_AS_THE_SENSOR = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 
 
 def picture_files(names: list[str]) -> list[Path]:
@@ -133,22 +135,27 @@ class PictureFiles:
         self.close()
 
     def _frames(self) -> Generator[Pixels, None, None]:
-        shape = None
+        first = None
         for file in self._files:
             said = self._said(file)
             for pixels in _read(file, said):
-                shape = shape or pixels.shape
-                self._check(said, pixels, shape)
+                first = pixels if first is None else first
+                self._check(said, pixels, first)
                 yield pixels
 
     def _said(self, file: Path) -> str:
         return self._called.get(file, str(file))
 
-    def _check(self, said: str, pixels: np.ndarray, shape: tuple[int, ...]) -> None:
-        if pixels.shape != shape:
+    def _check(self, said: str, pixels: Pixels, first: Pixels) -> None:
+        if pixels.shape != first.shape:
             raise BadInputError(
-                f"{said} has {pixels.shape[1]} x {pixels.shape[0]} px, the first picture {shape[1]} x {shape[0]}. "
-                "Take all pictures with one camera at one size."
+                f"{said} has {pixels.shape[1]} x {pixels.shape[0]} px, the first picture {first.shape[1]} x "
+                f"{first.shape[0]}. Take all pictures with one camera at one size."
+            )
+        if pixels.dtype != first.dtype:
+            raise BadInputError(
+                f"{said} has {8 * pixels.itemsize} bits a pixel, the first picture {8 * first.itemsize}. Export all "
+                "pictures alike, from the camera's own counts."
             )
         if self._bits is not None and pixels.max(initial=0) > 2**self._bits - 1:
             raise BadInputError(
@@ -166,7 +173,7 @@ def _read(file: Path, said: str) -> Iterator[Pixels]:
         elif file.suffix.lower() in (".tif", ".tiff"):
             yield from _read_tiff(file, said)
         else:
-            pixels = cv2.imdecode(np.fromfile(file, np.uint8), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
+            pixels = cv2.imdecode(np.fromfile(file, np.uint8), _AS_THE_SENSOR)
             if pixels is None:
                 raise ValueError("no picture in it")
             yield _counts(said, pixels)

@@ -40,7 +40,7 @@ def judge_mosaic(mean: Float32[np.ndarray, "rows cols"]) -> tuple[Verdict, ...]:
             False,
             difference,
             f"pixels of even and odd rows and columns alike to {MAX_DIFFERENCE:g}",
-            "This looks like the raw mosaic of a colour sensor. It does not move with the air, so that shifts are found "
-            "too small. Develop the camera's raw files (linear, 16 bits), or keep the pixels of one colour alone.",
+            "This looks like the raw mosaic of a colour sensor. It does not move with the air: shifts are found too "
+            "small. Develop the camera's raw files (linear, 16 bits), or keep the pixels of one colour alone.",
         ),
     )

@@ -1,5 +1,6 @@
 """Pictures of another camera: mean, scatter and count as of a capture; what cannot be is said before anything."""
 
+import struct
 import sys
 
 import cv2
@@ -7,11 +8,14 @@ import numpy as np
 import pytest
 import tifffile
 
+from app.capture.files import PictureFiles
 from app.capture.imported import import_pictures
 from app.capture.mosaic import judge_mosaic
 from app.errors import BadInputError
 from app.experiment.captures import load_capture, newest_pair
 from app.experiment.folder import ExperimentSettings, create_experiment
+from app.files.image_folder import read_grey
+from app.files.uploads.decode import decode
 from app.reconstruct.measure import measure
 from core.camera_noise import frame_variance, scattered_variance
 from core.scene import CameraNoise, FixedTexture, Scene, SolveModel, View
@@ -128,6 +132,22 @@ def test_a_pattern_of_few_pixels_a_period_is_no_mosaic(period_px):
     assert not judge_mosaic(pattern(384, 512))
 
 
+@pytest.mark.parametrize("turn", [1, 3, 6])
+def test_a_picture_is_read_as_its_sensor_has_it_by_every_door(tmp_path, turn):
+    file = tmp_path / "turned.jpg"
+    jpeg = cv2.imencode(".jpg", np.tile(np.arange(0, 256, 2, dtype=np.uint8), (96, 1)))[1].tobytes()
+    orientation = b"II*\0" + struct.pack("<IHHHIII", 8, 1, 0x0112, 3, 1, turn, 0)
+    exif = b"Exif\0\0" + orientation
+    file.write_bytes(jpeg[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + jpeg[2:])
+    with PictureFiles([file]) as pictures:
+        imported = pictures.grab().pixels
+    (page,) = decode("jpeg", file, tmp_path)
+    assert imported.shape == (96, 128)
+    assert np.all(np.diff(imported[0].astype(int)) >= 0)
+    np.testing.assert_array_equal(read_grey(file), imported)
+    np.testing.assert_array_equal(np.load(tmp_path / f"{page['name']}.npy"), imported)
+
+
 def test_without_rawpy_a_raw_file_says_what_to_install(experiment, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "rawpy", None)
     dng(tmp_path / "one.dng", frames()[0])
@@ -166,6 +186,16 @@ def test_what_is_imported_is_measured_as_what_is_captured_and_a_jpeg_says_what_i
     middle = np.all(np.abs(shifts["tif"].centres_px - [64, 48]) < 9, axis=1)
     assert shifts["tif"].displacement_px[middle, 0].mean() == pytest.approx(MOVED_PX, abs=0.02)
     assert shifts["jpg"].displacement_px[middle, 0].mean() == pytest.approx(MOVED_PX, abs=0.08)
+
+
+def test_pictures_of_8_and_of_16_bits_are_no_burst(tmp_path):
+    shallow, deep = tmp_path / "shallow.tif", tmp_path / "deep.tif"
+    tifffile.imwrite(shallow, np.zeros((96, 128), np.uint8))
+    tifffile.imwrite(deep, np.zeros((96, 128), np.uint16))
+    with PictureFiles([shallow, deep]) as pictures:
+        pictures.grab()
+        with pytest.raises(BadInputError, match=r"deep.tif has 16 bits a pixel, the first picture 8"):
+            pictures.grab()
 
 
 def test_what_cannot_be_is_said_before_anything_is_kept(experiment, tmp_path):
