@@ -10,6 +10,7 @@ from calibration.bundle import CalibratedOptics
 from calibration.further_projector import FurtherProjector
 from calibration.intrinsics import Intrinsics
 from calibration.model import Model
+from calibration.vertical import upper_edge
 
 
 def summary(step: StepOutcome, seconds: float) -> dict[str, Any]:
@@ -49,6 +50,8 @@ def summary(step: StepOutcome, seconds: float) -> dict[str, Any]:
             "tilt_std_rad": wall.tilt_std_rad,
             "points": wall.points,
             "rms_px": wall.quality.reprojection_rms_px,
+            "upper_edge": upper_edge(model.camera_optics.optics),
+            "plumb": model.record.placement.plumb_px is not None,
         }
     return found
 
@@ -75,6 +78,9 @@ def lines(content: dict[str, Any]) -> list[str]:
             f"distance ± {1e3 * w['offset_std_m']:.2f} mm, "
             f"tilt ± {math.degrees(w['tilt_std_rad']):.3f} degrees"
         )
+        if w["upper_edge"] is not None:
+            told = "" if w["plumb"] else "; if the camera hangs the other way up, give --plumb-px"
+            text.append(f"up in the room: the picture's {w['upper_edge']} edge{told}")
     advice = [
         *content["issues"],
         *(a for n in ("camera", "projector") for a in (content.get(n) or {}).get("advice", [])),

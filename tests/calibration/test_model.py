@@ -20,6 +20,7 @@ from calibration.record import (
 )
 from calibration.simulated_pictures import look
 from calibration.stripes import stripe_edges
+from calibration.vertical import upper_edge
 from calibration.views import digest, view_of
 from calibration.wall import correspondences
 from tests.calibration.practice import STANDS, exposed, project, rig, standing, wall
@@ -179,3 +180,25 @@ def test_a_level_board_on_the_wall_places_a_camera_without_projector():
     assert angle_deg(model.camera_optics.optics.rotation, camera.rotation @ axes.T) < 0.15
     true_distance_m = sheet.world_from_sheet[:, 2] @ (MARK_M - np.array(camera.position_m))
     assert 3.0 - model.camera_optics.optics.position_m[1] == pytest.approx(true_distance_m, rel=2e-3)
+
+
+@pytest.mark.parametrize("plumb", [False, True])
+def test_a_plumb_line_tells_which_end_of_a_level_board_is_up(plumb):
+    # The camera hangs upside down: as its pictures show it, the board's first row is the lowest.
+    size_px = np.array(practised().camera_size_px)
+    level = next(board for board in practised().boards if board.name == "board 0")
+    hanging = dataclasses.replace(
+        level, name="level", camera_px=rows_of(size_px - 1 - np.array(level.camera_px))
+    )
+    middle, high = float(size_px[0]) / 2, float(size_px[1])
+    record = dataclasses.replace(
+        practised(),
+        wall=None,
+        panel_size_px=None,
+        level=hanging,
+        placement=Placement(None, 0.0, 1.2, 3.0, (middle, 0.3 * high, middle, 0.7 * high) if plumb else None),
+    )
+
+    optics = build(record).camera_optics.optics
+
+    assert upper_edge(optics) == ("lower" if plumb else "upper")
