@@ -202,6 +202,18 @@ def board_of(
             assert_never(kind)
 
 
+def fixes_pose(points_m: Float[np.ndarray, "points 3"]) -> bool:
+    """Whether board points tell how the board stands: two rows and two columns do, a row and a point do not."""
+    if len(points_m) < 4:
+        return False
+    for left_out in range(len(points_m)):
+        others = np.delete(points_m, left_out, axis=0)
+        spread = np.linalg.svd(others - others.mean(axis=0), compute_uv=False)
+        if not spread[1] > 1e-6 * spread[0]:
+            return False
+    return True
+
+
 def to_8_bit(image: Image) -> np.ndarray:
     """The picture stretched to 8 bits for detection only; 8-bit pictures are returned as they are."""
     if image.dtype == np.uint8:

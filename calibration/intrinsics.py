@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from calibration.adjustment import DISTORTION_MODELS, Adjusted, Device, Pose, Sighting, adjust
+from calibration.board import fixes_pose
 from calibration.start import guess_intrinsics, guess_pose, guess_pose_and_error
 
 WORTHWHILE = 0.001
@@ -160,6 +161,6 @@ def _distance(fitted: Intrinsics, sighting: Sighting) -> Float[np.ndarray, " poi
 
 def _chosen(sighting: Sighting, good: Bool[np.ndarray, " points"]) -> Sighting:
     """The good points; all of them where too few would be left to place the board."""
-    if good.sum() < 6 or good.all():
+    if good.sum() < 6 or good.all() or not fixes_pose(sighting.points_m[good]):
         return sighting
     return replace(sighting, points_m=sighting.points_m[good], pixels_px=sighting.pixels_px[good])

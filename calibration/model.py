@@ -13,13 +13,15 @@ from jaxtyping import Float
 
 from calibration.adjustment import Device, Sighting
 from calibration.advice import advise, coverage
+from calibration.board import fixes_pose
 from calibration.bundle import CalibratedOptics, CalibratedWall, Quality
-from calibration.errors import TooFewViewsError
+from calibration.errors import CalibrationError, TooFewViewsError
 from calibration.flat_wall import FlatWall, adjust_on_wall
 from calibration.intrinsics import Intrinsics, fit_intrinsics
 from calibration.pair import Pair, fit_pair
 from calibration.record import Record, SeenBoard, array_of
 from calibration.vertical import level_of
+from calibration.views import ONE_ROW
 from calibration.wall import Correspondences, Plane
 from calibration.world import Anchor, WorldPose, difference, levelled, optics_in, world_of
 from core.view_frame import turn_to
@@ -55,7 +57,7 @@ def build(record: Record) -> Model:
     """The models of a record.
 
     Raises:
-        CalibrationError: fewer than three boards seen by the camera.
+        CalibrationError: fewer than three boards seen by the camera, or a single row of one.
     """
     camera = _camera(record)
     pair = _pair(record, camera)
@@ -86,6 +88,9 @@ def _camera(record: Record) -> Intrinsics:
     sightings = tuple(
         Sighting(0, i, array_of(b.points_m, 3), array_of(b.camera_px, 2)) for i, b in enumerate(record.boards)
     )
+    for board, sighting in zip(record.boards, sightings, strict=True):
+        if not fixes_pose(sighting.points_m):
+            raise CalibrationError(f"{board.name}: {ONE_ROW}")
     return fit_intrinsics(sightings, record.camera_size_px)
 
 

@@ -7,12 +7,16 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
-from calibration.board import Board, Detection, Image
+from calibration.board import Board, Detection, Image, fixes_pose
 from calibration.errors import ImageError
 
 # Edges wider than this [px, 0 to 100 % at full slope] blur corners by more than the noise does.
 BLUR_PX = 6.0
 SATURATED_FRACTION = 0.01
+ONE_ROW = (
+    "a single row of the board is seen, which does not tell how the board stands. Retake it with at least two rows "
+    "and two columns in the picture."
+)
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,9 @@ def view_of(name: str, image: Image, board: Board, full_scale: int | None = None
         issue = f"{name}: the board was not found. Retake it whole, sharp, evenly lit, with a white margin."
         return BoardView(name, width, height, None, np.zeros((0, 3)), issues=(issue,))
     points_m = board.points_m[detection.ids]
+    if not fixes_pose(points_m):
+        issue = f"{name}: {ONE_ROW}"
+        return BoardView(name, width, height, None, np.zeros((0, 3)), issues=(issue,))
     issues = []
     saturated = _saturated_fraction(image, detection, full_scale)
     if saturated > SATURATED_FRACTION:

@@ -5,17 +5,19 @@ boards -> camera        sequences -> projector        wall sequence or board on 
 
 import functools
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from app.calibrate.folder import CalibrationFolder, StepName
 from app.calibrate.whose import check_own
 from app.errors import BadInputError
 from app.files.image_folder import Sequence, find_images, read_grey, sequences
-from calibration.board import Board
+from calibration.board import Board, fixes_pose
 from calibration.bundle import CalibratedOptics
 from calibration.errors import CalibrationError, TooFewViewsError
 from calibration.further_projector import FurtherProjector, build_projector
@@ -187,12 +189,26 @@ def _merged(record: Record, boards: tuple[SeenBoard, ...], panel_px: tuple[int, 
 @functools.lru_cache(maxsize=2)
 def model_of(record: Record) -> Model:
     """The models of a record; the newest ones are remembered. Raises CalibrationError."""
-    return build(record)
+    with _solvable():
+        return build(record)
 
 
 @functools.lru_cache(maxsize=2)
 def _projector_of(record: Record, camera: CalibratedOptics) -> FurtherProjector:
-    return build_projector(record, camera)
+    with _solvable():
+        return build_projector(record, camera)
+
+
+@contextmanager
+def _solvable() -> Iterator[None]:
+    """Raise CalibrationError where what was seen does not determine the models, so that no solver finds them."""
+    try:
+        yield
+    except (np.linalg.LinAlgError, cv2.error) as error:
+        raise CalibrationError(
+            "No models follow from the views of the board: the equations have no solution. Retake the newest views, "
+            "with the board whole, elsewhere and tilted in each."
+        ) from error
 
 
 def own_model(calibration: CalibrationFolder, record: Record) -> Model | FurtherProjector:
@@ -291,7 +307,7 @@ def _lit_board(
             "board, keep it still, keep the frames in order."
         )
     seen = seen_board(view, digest(frames[-2]))
-    if good.sum() >= 6:
+    if good.sum() >= 6 and fixes_pose(view.points_m[good]):
         seen = replace(seen, panel_points_m=rows_of(view.points_m[good]), panel_px=rows_of(places[good]))
     return size, seen, issues
 

@@ -1,9 +1,10 @@
+import dataclasses
 from typing import get_args
 
 import numpy as np
 import pytest
 
-from calibration.board import CharucoBoard, Chessboard, CircleGrid, board_of
+from calibration.board import CharucoBoard, Chessboard, CircleGrid, board_of, fixes_pose
 from calibration.board_kind import BoardKind
 from calibration.errors import CalibrationError
 from calibration.simulated_pictures import look
@@ -53,6 +54,33 @@ def test_a_board_that_is_not_there_a_saturated_and_a_blurred_one_are_named():
     assert "not found" in empty.issues[0]
     assert any("saturated" in issue and "shorter exposure" in issue for issue in bright.issues)
     assert any("blur" in issue for issue in moved.issues) or not moved.usable
+
+
+def test_a_single_row_of_a_board_is_named_and_not_used():
+    camera, _ = rig(0.5)
+    board = CharucoBoard(9, 7, 0.08, 0.056)
+    sheet = standing(board, (0.0, 2.3, 1.2), (0, 15, 0))
+    # Covered but for the margin and two rows of squares, between which lies one row of corners.
+    paint = sheet.paint.copy()
+    paint[3 * 40 :] = 200
+    picture = exposed(
+        look(camera, (dataclasses.replace(sheet, paint=paint),), samples=1).expose(ambient=0.9),
+        np.random.default_rng(1),
+    )
+
+    view = view_of("covered", picture, board, full_scale=1023)
+
+    assert board.detect(picture) is not None
+    assert not view.usable
+    assert "covered: a single row of the board is seen" in view.issues[0]
+
+
+def test_two_rows_and_two_columns_tell_how_a_board_stands():
+    points = Chessboard(9, 6, 0.08).points_m
+    assert fixes_pose(points)
+    assert fixes_pose(points[[0, 1, 9, 10]])
+    for row in ([0, 1, 2, 3, 4, 5], [0, 10, 20, 30, 40, 50], [0, 1, 2, 3, 4, 5, 9], [0, 1, 9]):
+        assert not fixes_pose(points[row])
 
 
 def test_impossible_boards_are_refused():

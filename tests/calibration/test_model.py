@@ -150,6 +150,13 @@ def test_two_boards_are_too_few_and_the_message_says_how_many():
         build(record)
 
 
+def test_a_board_of_which_a_record_holds_a_single_row_is_named():
+    first, second, *others = practised().boards
+    row = dataclasses.replace(second, points_m=second.points_m[:9], camera_px=second.camera_px[:9])
+    with pytest.raises(CalibrationError, match="board 1: a single row"):
+        build(dataclasses.replace(practised(), boards=(first, row, *others)))
+
+
 def test_a_level_board_on_the_wall_places_a_camera_without_projector():
     camera, _ = rig(SCALE)
     sheet = wall()

@@ -11,10 +11,13 @@ from typer.testing import CliRunner
 
 from app.calibrate.folder import CalibrationFolder
 from app.calibrate.page import figures, measured_model
+from app.calibrate.steps import model_of
 from app.cli import create_cli
 from calibration.board import Chessboard
 from calibration.bundle import from_json
+from calibration.errors import CalibrationError
 from calibration.graycode import patterns
+from calibration.record import Record, SeenBoard, rows_of
 from calibration.simulated_pictures import look
 from tests.calibration.practice import STANDS, exposed, rig, standing
 
@@ -134,3 +137,11 @@ def test_a_folder_without_pictures_and_a_broken_picture_are_explained(tmp_path):
     done = run("camera", tmp_path, "--images", tmp_path, "--grid", "9x6", "--square", "75mm")
     assert "view_1.png" in str(done.exception)
     assert "cut short" in str(done.exception)
+
+
+def test_views_that_no_solver_can_use_are_no_crash():
+    points = rows_of(BOARD.points_m)
+    # Every corner of the board in one place.
+    boards = tuple(SeenBoard(str(n), str(n), points, rows_of(np.full((54, 2), 100.0))) for n in range(3))
+    with pytest.raises(CalibrationError, match="Retake the newest views"):
+        model_of(Record("camera", (640, 512), boards=boards))
