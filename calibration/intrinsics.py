@@ -4,7 +4,8 @@ Orders are nested (none, k1, k2, tangential, k3). A higher one is taken if it lo
     numbers * log(mean square residual) + PENALTY * unknowns
 and the rms by `WORTHWHILE`. The penalty lies between Akaike's 2 and Schwarz's log(numbers): a lens
 coefficient that is left out turns the camera by as much as it hides (a tangential 6e-4 by 0.1 degrees),
-one too many only widens the standard deviations.
+one too many only widens the standard deviations. An order whose distortion turns back within the picture is
+passed over: it has no direction for the pixels beyond, though it may fit boards that were not held there.
 """
 
 from dataclasses import dataclass, replace
@@ -15,11 +16,15 @@ from jaxtyping import Bool, Float
 
 from calibration.adjustment import DISTORTION_MODELS, Adjusted, Device, Pose, Sighting, adjust
 from calibration.board import fixes_pose
+from calibration.errors import TooFewViewsError
 from calibration.start import guess_intrinsics, guess_pose, guess_pose_and_error
+from core.lens import has_direction
 
 WORTHWHILE = 0.001
 PENALTY = 3.0
 OUTLIER_SIGMAS = 6.0
+# Another order may fit worse by this much where the best one turns back within the picture.
+WORSE = 1.5
 
 
 # Only made-up pictures fit better; the logarithm needs a floor.
@@ -68,17 +73,34 @@ def fit_intrinsics(
     offset_lens: bool = False,
     models: tuple[str, ...] = tuple(DISTORTION_MODELS),
 ) -> Intrinsics:
-    """Adjust one device (number 0); `offset_lens` also starts from principal points far off centre."""
+    """Adjust one device (number 0); `offset_lens` also starts from principal points far off centre.
+
+    Raises:
+        TooFewViewsError: no distortion that fits has a direction for each pixel of the picture.
+    """
     points = [s.points_m for s in sightings]
     pixels = [s.pixels_px for s in sightings]
     intrinsics = guess_intrinsics(points, pixels, size_px, offset_lens)
     poses = tuple(guess_pose(p, q, intrinsics) for p, q in zip(points, pixels, strict=True))
-    fitted = _fit(intrinsics, poses, sightings, models)
-    kept, outliers = _without_outliers(fitted, sightings, models[-1])
+    fitted = _fit(intrinsics, poses, sightings, models, size_px)
+    kept, outliers = _without_outliers(fitted, sightings, models[-1], size_px)
     if outliers:
-        again = _fit(fitted.device.intrinsics, fitted.adjusted.poses, kept, models)
+        again = _fit(fitted.device.intrinsics, fitted.adjusted.poses, kept, models, size_px)
         fitted = replace(again, outliers=outliers, all_points_rms_px=fitted.rms_px)
+    best_px = max(min(fitted.rms_by_model_px.values()), _PERFECT_PX)
+    if not _shows_corners(fitted.device, size_px) or fitted.rms_px > WORSE * best_px:
+        raise TooFewViewsError(
+            f"The distortion that fits the boards to {best_px:.2f} px turns back before the picture's corners: what "
+            "is seen there is not known. Add views with the board in the corners of the picture."
+        )
     return fitted
+
+
+def _shows_corners(device: Device, size_px: tuple[int, int]) -> bool:
+    """Whether the lens has a direction for the picture's corners, and so for all that is nearer to its axis."""
+    right, lower = size_px[0] - 0.5, size_px[1] - 0.5
+    corners = np.array([[-0.5, -0.5], [right, -0.5], [-0.5, lower], [right, lower]])
+    return bool(has_direction(device.matrix, device.intrinsics[4:], corners).all())
 
 
 def _fit(
@@ -86,6 +108,7 @@ def _fit(
     poses: tuple[Pose, ...],
     sightings: tuple[Sighting, ...],
     models: tuple[str, ...],
+    size_px: tuple[int, int],
 ) -> Intrinsics:
     """The chain of models, each from the one before."""
     numbers = 2 * sum(len(s.points_m) for s in sightings)
@@ -102,8 +125,9 @@ def _fit(
         free = 4 + sum(flags) + 6 * len(poses)
         tried[model] = (rms, numbers * np.log(max(rms, _PERFECT_PX) ** 2) + free * PENALTY, adjusted)
         intrinsics, poses = adjusted.devices[0].intrinsics, adjusted.poses
-    chosen = models[0]
-    for model in models[1:]:
+    whole = [m for m in models if _shows_corners(tried[m][2].devices[0], size_px)] or list(models)
+    chosen = whole[0]
+    for model in whole[1:]:
         better = tried[model][0] < (1 - WORTHWHILE) * tried[chosen][0]
         if better and tried[model][1] < tried[chosen][1]:
             chosen = model
@@ -127,7 +151,7 @@ def _turned(adjusted: Adjusted, sightings: tuple[Sighting, ...]) -> tuple[Pose, 
 
 
 def _without_outliers(
-    fitted: Intrinsics, sightings: tuple[Sighting, ...], model: str
+    fitted: Intrinsics, sightings: tuple[Sighting, ...], model: str, size_px: tuple[int, int]
 ) -> tuple[tuple[Sighting, ...], int]:
     """The sightings without points far outside the robust scatter; and how many those were.
 
@@ -144,7 +168,7 @@ def _without_outliers(
         kept = tuple(_chosen(s, g) for s, g in zip(sightings, good, strict=True))
         if worst <= limit:
             break
-        fitted = _fit(fitted.device.intrinsics, fitted.adjusted.poses, kept, (model,))
+        fitted = _fit(fitted.device.intrinsics, fitted.adjusted.poses, kept, (model,), size_px)
     total, left = (sum(len(s.points_m) for s in group) for group in (sightings, kept))
     return kept, total - left
 

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from core.lens import sees_along
 from core.objects import RoomObject
 from core.rays.optics import pinhole
 from core.scene import Marks, ProjectedPattern, Scene
@@ -114,12 +115,16 @@ def first_hit(
 def _on_the_wall(
     scene: Scene, view: int, pixels: Float[np.ndarray, "points 2"]
 ) -> tuple[Float[np.ndarray, "points 3"], Float[np.ndarray, " points"]]:
-    """Where each pixel looks on the plane of the back wall, and from how far; NaN where it looks away."""
+    """Where each pixel looks on the plane of the back wall, and from how far; NaN where it looks away.
+
+    NaN too where the lens's distortion has no direction for a pixel.
+    """
     with jax.enable_x64(True):
         lens = pinhole(scene.views[view].camera)
         direction = np.asarray(jax.vmap(lens.direction)(jnp.asarray(pixels, jnp.float64)))
         origin = np.asarray(lens.position_m)
-    forward = np.where(direction[:, 1] > 1e-9, direction[:, 1], np.nan)
+    ahead = (direction[:, 1] > 1e-9) & sees_along(scene.views[view].camera, pixels)
+    forward = np.where(ahead, direction[:, 1], np.nan)
     range_m = (scene.room.upper_m[1] - origin[1]) / forward
     return origin + range_m[:, None] * direction, range_m
 

@@ -2,12 +2,15 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from calibration.adjustment import Sighting
 from calibration.advice import advise, coverage
 from calibration.board import Chessboard
+from calibration.errors import TooFewViewsError
 from calibration.intrinsics import fit_intrinsics
-from core.geometry import Optics
+from core.geometry import Optics, looking_along_y
+from core.lens import has_direction
 from tests.calibration.practice import STANDS, project, rig, standing
 
 BOARD = Chessboard(11, 8, 0.06)
@@ -47,6 +50,46 @@ def test_the_distortion_order_is_the_lowest_that_the_residuals_justify():
     models = [fit_intrinsics(sightings_of(o, 0.05), (1280, 1024)).model for o in (plain, radial, tangential)]
 
     assert models == ["none", "k1", "k1 k2 p1 p2"]
+
+
+def within(camera: Optics, reach: float, seed: int) -> tuple[Sighting, ...]:
+    """Twelve boards in the middle of the picture, by this part of its size, with noise of 0.05 px."""
+    rng, size_px = np.random.default_rng(seed), np.array([camera.width_px, camera.height_px])
+    points_m = BOARD.points_m - BOARD.points_m.mean(axis=0)
+    seen: list[Sighting] = []
+    while len(seen) < 12:
+        turn = Rotation.from_rotvec(rng.uniform(-0.5, 0.5, 3)).as_matrix()
+        z_m = rng.uniform(0.6, 1.2)
+        across_m = rng.uniform(-0.7, 0.7, 2) * reach * z_m * size_px / 2 / camera.focal_px
+        pixels = project(camera, (points_m @ turn.T + [*across_m, z_m]) @ camera.rotation)
+        if np.abs(pixels / size_px - 0.5).max() < reach / 2:
+            seen.append(Sighting(0, len(seen), points_m, pixels + rng.normal(0, 0.05, pixels.shape)))
+    return tuple(seen)
+
+
+def wide(k1: float, k2: float, k3: float) -> Optics:
+    plain = looking_along_y(position_m=(0.0, 0.0, 0.0), width_px=1280, height_px=1024, focal_px=900.0)
+    return dataclasses.replace(plain, distortion=(k1, k2, 0.0, 0.0, k3))
+
+
+def test_a_distortion_that_turns_back_within_the_picture_is_passed_over():
+    camera = wide(-0.35, 0.14, -0.025)
+    corner = np.array([[0.0, 0.0]])
+    passed_over = 0
+    for seed in range(4):
+        seen = within(camera, 0.62, seed)
+        fit = fit_intrinsics(seen, (1280, 1024))
+        assert has_direction(fit.device.matrix, fit.device.intrinsics[4:], corner).all()
+        highest = fit_intrinsics(seen, (1280, 1024), models=("k1 k2", "k1 k2 p1 p2 k3"))
+        passed_over += highest.model == "k1 k2"
+        assert fit.rms_px < 1.1 * min(fit.rms_by_model_px.values())
+    assert passed_over
+
+
+def test_boards_in_the_middle_alone_of_a_lens_that_needs_more_ask_for_the_corners():
+    # Of these two orders one is far off and the other turns back at 0.7 of a corner's distance.
+    with pytest.raises(TooFewViewsError, match="corners of the picture"):
+        fit_intrinsics(within(wide(-0.6, 0.0, 0.0), 0.6, 0), (1280, 1024), models=("none", "k1"))
 
 
 def test_standard_deviations_predict_the_scatter():

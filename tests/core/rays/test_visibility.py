@@ -44,6 +44,16 @@ def test_what_keeps_the_projector_from_the_wall_hides_it_too():
     assert np.array_equal(hidden, ((X_M > 1.5) & (X_M < 2.5)) | ((X_M > 16.0 / 9.0) & (X_M < 3.0)))
 
 
+def test_pixels_beyond_where_the_lens_turns_back_see_nothing():
+    # r (1 - 10 r^2) grows up to r = 0.18, whose picture is 122 px from the axis.
+    camera = replace(CAMERA, distortion=(-10.0, 0.0, 0.0, 0.0, 0.0))
+    scene = replace(SCENE, views=(View(camera=camera),), objects=())
+
+    seen = sees_wall(scene, 0, PIXELS, margin_px=0.0)
+
+    assert np.array_equal(seen, np.abs(PIXELS[:, 0] - 209.5) < 121.7)
+
+
 def test_without_objects_nothing_is_hidden():
     assert not hidden_by_objects(replace(SCENE, objects=()), 0, PIXELS, margin_px=50.0).any()
 
