@@ -13,6 +13,8 @@ from jaxtyping import Float, Float32, Shaped
 
 from calibration.bundle import CameraResponse, ProjectorResponse, Quality
 from calibration.errors import ImageError
+from calibration.saturation import saturated_from
+from calibration.views import SATURATED_FRACTION
 
 # Sizes are checked here, by a message, and not by the types.
 Burst = Shaped[np.ndarray, "_ _ _"]
@@ -47,14 +49,15 @@ def measure_camera(
     """
     _check(dark, ramp)
     limit = 2**bits - 1
-    darkness = level_statistics(dark, limit)
-    levels = [level_statistics(burst, limit) for burst in ramp]
+    end = saturated_from(ramp, limit)
+    darkness = level_statistics(dark, end)
+    levels = [level_statistics(burst, end) for burst in ramp]
     usable = [s for s in levels if s.saturated < 1e-4 and s.mean > darkness.mean]
     if len(usable) < 3:
         raise ImageError(
             f"{len(usable)} of {len(levels)} levels are brighter than dark and not saturated; expected at "
             "least 3. Retake the ramp: shorten the exposure until the brightest level stays below "
-            f"{limit} counts."
+            f"{end} counts."
         )
     gain, gain_std, read_counts = _photon_transfer(darkness, usable)
     curve, nonlinearity = _linearity(darkness, levels, exposures_s)
@@ -86,12 +89,12 @@ def level_statistics(burst: Burst, limit: int) -> LevelStatistics:
 
 
 def measure_projector(
-    levels: tuple[float, ...], ramp: tuple[Burst, ...], dark_counts: float
+    levels: tuple[float, ...], ramp: tuple[Burst, ...], dark_counts: float, bits: int
 ) -> ProjectorResponse:
     """Luminance (0..1 of white, black level included) by grey level, and the best exponent.
 
     Raises:
-        ImageError: fewer than four levels, a ramp whose order is wrong, or one that does not rise.
+        ImageError: fewer than four levels, a ramp whose order is wrong, one that does not rise, or saturated white.
     """
     if len(levels) != len(ramp) or len(levels) < 4:
         raise ImageError(
@@ -110,6 +113,7 @@ def measure_projector(
             f"The grey ramp goes from {light[0]:.0f} to {light[-1]:.0f} counts above dark; expected it to rise. "
             "Every level is saturated, or the projector's light does not reach the camera: shorten the exposure."
         )
+    _check_white(ramp[order[-1]], saturated_from(ramp, 2**bits - 1))
     relative = light / light[-1]
     black = float(relative[0]) if grey[0] <= 0 else 0.0
     span = np.clip((relative - black) / (1 - black), 0, 1)
@@ -121,8 +125,13 @@ def measure_projector(
     )
 
 
-def flat_field(white: Burst, black: Burst) -> Float32[np.ndarray, "rows cols"]:
-    """Relative illumination and vignetting, its median one: (mean white - mean black) / median."""
+def flat_field(white: Burst, black: Burst, bits: int) -> Float32[np.ndarray, "rows cols"]:
+    """Relative illumination and vignetting, its median one: (mean white - mean black) / median.
+
+    Raises:
+        ImageError: white is no brighter than black, or saturated.
+    """
+    _check_white(white, saturated_from((white, black), 2**bits - 1))
     lit = white.astype(np.float64).mean(axis=0) - black.astype(np.float64).mean(axis=0)
     middle = float(np.median(lit))
     if middle <= 0:
@@ -187,6 +196,15 @@ def _advice(levels: list[LevelStatistics], nonlinearity: float) -> tuple[str, ..
             "Turn its gamma off, or keep the pattern in the straight part."
         )
     return tuple(advice)
+
+
+def _check_white(white: Burst, end: int) -> None:
+    saturated = float(np.mean(white >= end))
+    if saturated > SATURATED_FRACTION:
+        raise ImageError(
+            f"{100 * saturated:.0f} % of the brightest grey level is saturated, at {end} counts; expected at "
+            f"most {100 * SATURATED_FRACTION:.0f} %. Retake the grey ramp with a shorter exposure."
+        )
 
 
 def _check(dark: Burst, ramp: tuple[Burst, ...]) -> None:

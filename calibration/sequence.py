@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 
 from calibration.graycode import Decoded
+from calibration.saturation import saturated_from
 from calibration.stripes import EdgeMap
 
 # Part of the lit pixels whose pattern and inverse miss white and black by 30 %.
@@ -43,7 +44,8 @@ def sequence_issues(
             "under changing light. Retake the sequence without touching anything."
         )
     top = full_scale if full_scale is not None else _type_maximum(frames)
-    saturated = float(np.mean(white[decoded.lit] >= top)) if top else 0.0
+    end = saturated_from(tuple(frames[-2:]), int(top))
+    saturated = float(np.mean(white[decoded.lit] >= end)) if top else 0.0
     if saturated > 0.01:
         issues.append(
             f"{name}: {100 * saturated:.0f} % of the lit picture is saturated in white. "

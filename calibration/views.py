@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from calibration.board import Board, Detection, Image, fixes_pose
 from calibration.errors import ImageError
+from calibration.saturation import saturated_from
 
 # Edges wider than this [px, 0 to 100 % at full slope] blur corners by more than the noise does.
 BLUR_PX = 6.0
@@ -38,7 +39,7 @@ class BoardView:
 
 
 def view_of(name: str, image: Image, board: Board, full_scale: int | None = None) -> BoardView:
-    """Look for `board` in `image`; `full_scale` is the saturated count (default: the type's maximum)."""
+    """Look for `board` in `image`; `full_scale` is the largest count (default: the type's maximum)."""
     if image.ndim != 2 or min(image.shape) < 16:
         raise ImageError(f"{name} has shape {image.shape}; expected one grey picture of at least 16 x 16 px.")
     height, width = image.shape
@@ -78,7 +79,7 @@ def _saturated_fraction(image: Image, detection: Detection, full_scale: int | No
     mask = np.zeros(image.shape, np.uint8)
     cv2.fillConvexPoly(mask, hull.astype(np.int32), 1)
     inside = image[mask > 0]
-    return float(np.mean(inside >= full_scale)) if inside.size else 0.0
+    return float(np.mean(inside >= saturated_from((image,), full_scale))) if inside.size else 0.0
 
 
 def _edge_width_px(image: Image, points_m: np.ndarray, pixels_px: np.ndarray) -> float:

@@ -49,8 +49,8 @@ def calibrate_response(calibration: CalibrationFolder, camera: str, folder: Path
         if len(grey) >= 4:
             top = max(grey)
             levels = tuple(level / top for level in grey)
-            projector = measure_projector(levels, tuple(grey.values()), response.dark_counts)
-            flat = flat_field(grey[top], grey[min(grey)])
+            projector = measure_projector(levels, tuple(grey.values()), response.dark_counts, bits)
+            flat = flat_field(grey[top], grey[min(grey)], bits)
             path = calibration.flat_field(camera)
             write_durably(path, lambda temporary: tifffile.imwrite(temporary, flat))
             response = dataclasses.replace(response, flat_field=path.name)

@@ -26,6 +26,8 @@ from drivers.protocols import CameraInfo, Frame, Pixels
 RAW_SUFFIXES = {".dng", ".nef", ".cr2", ".cr3", ".arw", ".raf", ".rw2", ".orf", ".pef"}
 LOSSY_SUFFIXES = {".jpg", ".jpeg"}
 LARGEST_PX = 400_000_000
+# What 14 bits hold: beyond it a file of 16 bits is one of a camera of more bits, or counts were shifted up.
+FEWER_BITS_COUNTS = 2**14 - 1
 # Grey in the file's own bits, not turned by what the file says of how the camera was held: a calibration is not.
 _AS_THE_SENSOR = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 
@@ -55,6 +57,7 @@ def picture_files(names: list[str]) -> list[Path]:
 class PictureFiles:
     """A camera whose frames are the pictures of some files, one after the other. `frames` counts them.
 
+    `highest_counts` is that of the first picture.
     `called` says what their owner calls files that lie here under other names.
     """
 
@@ -68,6 +71,7 @@ class PictureFiles:
         if first is None:
             raise BadInputError(f"{self._said(files[0])} holds no picture. Export it again.")
         self._shape, self._itemsize = first.shape, first.itemsize
+        self.highest_counts = int(first.max(initial=0))
 
     @property
     def exposure_s(self) -> float | None:
@@ -108,6 +112,11 @@ class PictureFiles:
     def lossy(self) -> bool:
         """Whether a file was compressed so that fine shifts may be lost."""
         return any(file.suffix.lower() in LOSSY_SUFFIXES for file in self._files)
+
+    @property
+    def may_have_fewer_bits(self) -> bool:
+        """Whether nobody said how many bits the camera has, and its counts fit in fewer than the files have."""
+        return self._bits is None and self._itemsize > 1 and self.highest_counts <= FEWER_BITS_COUNTS
 
     def grab(self) -> Frame:
         """The next picture. Raises BadInputError for one that cannot be read, DeviceNotFoundError after the last."""

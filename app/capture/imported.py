@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from app.capture.burst import TakenBurst, take
 from app.capture.checks import judged
-from app.capture.files import PictureFiles, picture_files
+from app.capture.files import FEWER_BITS_COUNTS, PictureFiles, picture_files
 from app.capture.watched import UNWATCHED, BurstWatch, run_watched
 from app.errors import AirlensError, BadInputError
 from app.experiment.capture_parts import parts_of
@@ -77,7 +77,7 @@ def import_files(
     taken: dict[Path | None, TakenBurst] = {}
     for shown, files in sorted(given.items(), key=lambda one: (ROLES.index(one[0].role), views[one[0]])):
         with PictureFiles(files, bits, called) as pictures:
-            known = _verdicts(pictures, pictures.lossy or shown in lossy)
+            known = _verdicts(pictures, shown.role, pictures.lossy or shown in lossy)
             one = _brought(experiment, pictures, shown.role, views[shown], known, told, watch)
         taken[one.folder] = one
     return list(taken.values())
@@ -182,9 +182,17 @@ def _check_size(experiment: Experiment, pictures: PictureFiles, role: str, view:
         )
 
 
-def _verdicts(pictures: PictureFiles, lossy: bool) -> tuple[Verdict, ...]:
+def _verdicts(pictures: PictureFiles, role: CaptureRole, lossy: bool) -> tuple[Verdict, ...]:
     """What the files themselves say of the pictures."""
     found = []
+    if role != "dark" and pictures.may_have_fewer_bits:
+        found.append(
+            Verdict(
+                "bits", False, float(pictures.highest_counts), f"counts above {FEWER_BITS_COUNTS} in 16-bit files",
+                "A camera of 10, 12 or 14 bits may have taken them. If so, state its bits (bits, --bits): a longer "
+                "exposure, as a low level else asks for, would saturate it.",
+            )
+        )  # fmt: skip
     if lossy:
         found.append(
             Verdict(

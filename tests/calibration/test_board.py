@@ -47,12 +47,17 @@ def test_a_board_that_is_not_there_a_saturated_and_a_blurred_one_are_named():
 
     empty = view_of("empty", np.full((512, 640), 200, np.uint16), board, 1023)
     bright = view_of("bright", exposed(luminance * 2.0, rng), board, 1023)
+    # 10 bits at the top of 16: the highest count is 65472.
+    aligned = view_of("aligned", exposed(luminance * 2.0, rng) * np.uint16(64), board)
+    sound = view_of("sound", exposed(luminance, rng) * np.uint16(64), board)
     smeared = sum(np.roll(luminance, shift, axis=1) for shift in range(-6, 7)) / 13
     moved = view_of("moved", exposed(smeared, rng), board, 1023)
 
     assert not empty.usable
     assert "not found" in empty.issues[0]
     assert any("saturated" in issue and "shorter exposure" in issue for issue in bright.issues)
+    assert any("saturated" in issue for issue in aligned.issues)
+    assert sound.issues == ()
     assert any("blur" in issue for issue in moved.issues) or not moved.usable
 
 

@@ -57,11 +57,31 @@ def test_a_projector_s_curve_and_exponent_are_found_to_half_a_percent():
     rng = np.random.default_rng(3)
     levels = tuple(np.linspace(0, 1, 9))
     light = [0.01 + 0.99 * g**2.2 for g in levels]
-    found = measure_projector(levels, tuple(burst(8000 * v, 4, rng) for v in light), DARK)
+    found = measure_projector(levels, tuple(burst(8000 * v, 4, rng) for v in light), DARK, 10)
 
     assert found.gamma == pytest.approx(2.2, rel=5e-3)
     np.testing.assert_allclose(found.luminance, light, atol=5e-3)
     assert found.black_level == pytest.approx(0.01, abs=2e-3)
+
+
+@pytest.mark.parametrize(("last", "end", "step"), [(1023, 1023, 64), (940, 940, 1)])
+def test_a_camera_whose_counts_end_below_full_scale_is_seen_to_saturate(last, end, step):
+    """10 bits at the top of 16, and a sensor that clips at 940 of 1023."""
+    rng = np.random.default_rng(6)
+    bits = 16 if step > 1 else 10
+    light = (1500, 4000, 6500, (last - DARK) / GAIN)
+    ramp = tuple(np.minimum(burst(e, 8, rng), end) * np.uint16(step) for e in light)
+    dark = burst(0, 8, rng) * np.uint16(step)
+
+    found = measure_camera("camera", dark, ramp, bits)
+
+    assert found.gain_counts_per_e / step == pytest.approx(GAIN, rel=0.01)
+    assert any("Levels 3 are saturated" in a for a in found.quality.advice)
+    levels = (0.0, 0.4, 0.7, 1.0)
+    with pytest.raises(ImageError, match=f"saturated, at {end * step} counts"):
+        measure_projector(levels, ramp, DARK * step, bits)
+    with pytest.raises(ImageError, match="shorter exposure"):
+        flat_field(ramp[-1], dark, bits)
 
 
 def test_what_is_no_ramp_of_raw_frames_is_refused():
@@ -73,7 +93,9 @@ def test_what_is_no_ramp_of_raw_frames_is_refused():
     with pytest.raises(ImageError, match="no raw counts"):
         measure_camera("camera", dark, still, 10)
     with pytest.raises(ImageError, match="does not grow"):
-        measure_projector((0.0, 0.3, 0.6, 1.0), tuple(burst(e, 2, rng) for e in (10, 6000, 3000, 8000)), DARK)
+        measure_projector(
+            (0.0, 0.3, 0.6, 1.0), tuple(burst(e, 2, rng) for e in (10, 6000, 3000, 8000)), DARK, 10
+        )
     with pytest.raises(ImageError, match="fewer than 2 frames"):
         measure_camera("camera", dark[:1], (dark, dark, dark), 10)
 
@@ -85,6 +107,6 @@ def test_the_flat_field_is_vignetting_over_its_median():
     white = np.rint(800 * fall + rng.normal(0, 2, (8, *SHAPE)) + DARK)
     black = np.rint(rng.normal(0, 2, (8, *SHAPE)) + DARK)
 
-    flat = flat_field(white, black)
+    flat = flat_field(white, black, 10)
 
     np.testing.assert_allclose(flat, fall / np.median(fall), atol=0.012)

@@ -71,7 +71,7 @@ def response(name: str, words: str, dark: np.ndarray, ramp: tuple[np.ndarray, ..
 
 def ramp(name: str, words: str, levels: tuple[float, ...], counts: tuple[int, ...]) -> Row:
     bursts = tuple(constant(c, 12) for c in counts)
-    return Row(STAGE, name, lambda: measure_projector(levels, bursts, 0.0).gamma, Refused(words))
+    return Row(STAGE, name, lambda: measure_projector(levels, bursts, 0.0, 12).gamma, Refused(words))
 
 
 def verdict(name: str, expected: str, value: float) -> Row:
@@ -108,13 +108,14 @@ ROWS = [
     response(
         "light without noise", "no raw counts", constant(10, 12), tuple(constant(c, 12) for c in (50, 90, 200))
     ),
-    Row(STAGE, "flat field of a constant", lambda: flat_field(constant(4095, 12), constant(10, 12)), Near(1.0)),
-    Row(STAGE, "flat field of darkness", lambda: flat_field(DARK * 0, DARK * 0), Refused("not brighter")),
+    Row(STAGE, "flat field of a constant", lambda: flat_field(constant(4094, 12), constant(10, 12), 12), Near(1.0)),
+    Row(STAGE, "flat field of saturation", lambda: flat_field(FULL, DARK, 12), Refused("shorter exposure")),
+    Row(STAGE, "flat field of darkness", lambda: flat_field(DARK * 0, DARK * 0, 12), Refused("not brighter")),
     ramp("a grey ramp of darkness", "does not grow", LEVELS, (0, 0, 0, 0)),
     ramp("a grey ramp upside down", "Check the order", LEVELS, (4000, 3000, 2000, 1000)),
     ramp("three grey levels", "at least 4", LEVELS[:3], (0, 5, 9)),
     Row(STAGE, "a straight grey ramp, 16 bits",
-        lambda: measure_projector(LEVELS, tuple(constant(c, 16) for c in (0, 16000, 32000, 64000)), 0.0).gamma,
+        lambda: measure_projector(LEVELS, tuple(constant(c, 16) for c in (0, 16000, 32000, 64000)), 0.0, 16).gamma,
         Near(1.0, abs=2e-3)),
     ramp("a saturated grey ramp", "shorten the exposure", LEVELS, (4095,) * 4),
     verdict("verdicts on darkness", "level contrast focus", 0.0),

@@ -188,6 +188,15 @@ def test_what_is_imported_is_measured_as_what_is_captured_and_a_jpeg_says_what_i
     assert shifts["jpg"].displacement_px[middle, 0].mean() == pytest.approx(MOVED_PX, abs=0.08)
 
 
+@pytest.mark.parametrize("bits", [None, 12])
+def test_counts_of_12_bits_in_files_of_16_ask_for_the_bits(experiment, tmp_path, bits):
+    (one,) = import_pictures(experiment, {"reference": [written(tmp_path / "r", "tif")]}, bits)
+    bad = {verdict.name: verdict for verdict in one.burst.verdicts if not verdict.good}
+    assert ("bits" in bad) == ("level" in bad) == (bits is None)
+    if bits is None:
+        assert "--bits" in bad["bits"].advice
+
+
 def test_pictures_of_8_and_of_16_bits_are_no_burst(tmp_path):
     shallow, deep = tmp_path / "shallow.tif", tmp_path / "deep.tif"
     tifffile.imwrite(shallow, np.zeros((96, 128), np.uint8))
