@@ -89,9 +89,10 @@ def fit_intrinsics(
         fitted = replace(again, outliers=outliers, all_points_rms_px=fitted.rms_px)
     best_px = max(min(fitted.rms_by_model_px.values()), _PERFECT_PX)
     if not _shows_corners(fitted.device, size_px) or fitted.rms_px > WORSE * best_px:
+        picture = "projector's panel" if offset_lens else "picture"
         raise TooFewViewsError(
-            f"The distortion that fits the boards to {best_px:.2f} px turns back before the picture's corners: what "
-            "is seen there is not known. Add views with the board in the corners of the picture."
+            f"The distortion that fits the boards to {best_px:.2f} px turns back before the corners of the "
+            f"{picture}, whose rays it does not tell. Add views with the board in these corners."
         )
     return fitted
 

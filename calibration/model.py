@@ -27,6 +27,8 @@ from calibration.world import Anchor, WorldPose, difference, levelled, optics_in
 from core.view_frame import turn_to
 
 MINIMUM_VIEWS = 3
+# Of the focal length; boards that all face the camera leave it open, and any one fits them.
+MOST_FOCAL_STD = 0.1
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ def build(record: Record) -> Model:
     """The models of a record.
 
     Raises:
-        CalibrationError: fewer than three boards seen by the camera, or a single row of one.
+        CalibrationError: fewer than three boards seen by the camera, a single row of one, or none of them tilted.
     """
     camera = _camera(record)
     pair = _pair(record, camera)
@@ -91,7 +93,15 @@ def _camera(record: Record) -> Intrinsics:
     for board, sighting in zip(record.boards, sightings, strict=True):
         if not fixes_pose(sighting.points_m):
             raise CalibrationError(f"{board.name}: {ONE_ROW}")
-    return fit_intrinsics(sightings, record.camera_size_px)
+    fit = fit_intrinsics(sightings, record.camera_size_px)
+    focal_std = float(fit.std[0] / fit.device.intrinsics[0])
+    if not focal_std <= MOST_FOCAL_STD:
+        raise TooFewViewsError(
+            f"The focal length is known to {100 * focal_std:.0f} % only; expected {100 * MOST_FOCAL_STD:.0f} % or "
+            "better. Add views with the board tilted by 30 degrees, to every side: boards that face the camera tell "
+            "nothing of it."
+        )
+    return fit
 
 
 def _pair(record: Record, camera: Intrinsics) -> Pair | None:

@@ -110,11 +110,11 @@ class Shooter:
 
 
 def save(file: Path, pixels: np.ndarray) -> Path:
-    """Write a picture durably: PNG as the camera gave it, means as TIFF."""
+    """Write a picture durably: PNG as the camera gave it, means as TIFF. Raises OSError, as of a full disk."""
 
     def write(temporary: Path) -> None:
         if file.suffix == ".png":
-            cv2.imwrite(str(temporary), pixels)
+            temporary.write_bytes(cv2.imencode(".png", pixels)[1].tobytes())  # imwrite tells no error
         else:
             tifffile.imwrite(temporary, pixels)
 

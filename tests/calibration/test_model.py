@@ -12,6 +12,7 @@ from calibration.model import Model, build
 from calibration.record import (
     Placement,
     Record,
+    SeenBoard,
     SeenWall,
     record_from_json,
     record_to_json,
@@ -148,6 +149,20 @@ def test_two_boards_are_too_few_and_the_message_says_how_many():
     record = dataclasses.replace(practised(), boards=practised().boards[:2])
     with pytest.raises(CalibrationError, match="2 usable board views; expected at least 3"):
         build(record)
+
+
+def test_boards_that_all_face_the_camera_leave_the_focal_length_open():
+    size_px, pixels = np.array(practised().camera_size_px), BOARD.points_m[:, :2] / BOARD.square_m
+    rng = np.random.default_rng(1)
+    facing = []
+    for number in range(8):
+        px_per_square = rng.uniform(20, 30)
+        corner = rng.uniform(0.05, 0.3, 2) * size_px
+        shown = corner + px_per_square * pixels + rng.normal(0, 0.05, pixels.shape)
+        facing.append(SeenBoard(str(number), str(number), rows_of(BOARD.points_m), rows_of(shown)))
+    size = practised().camera_size_px
+    with pytest.raises(CalibrationError, match="tilted by 30 degrees"):
+        build(Record("camera", size, boards=tuple(facing)))
 
 
 def test_a_board_of_which_a_record_holds_a_single_row_is_named():
