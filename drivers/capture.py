@@ -15,6 +15,7 @@ from drivers.clock import Clock, SystemClock, wait_until
 from drivers.errors import DeviceNotFoundError, DeviceTimeoutError, FrameError, FrameFault
 from drivers.moments import RunningMoments
 from drivers.protocols import Camera, CameraInfo, Frame
+from drivers.saturation import saturated_share
 from drivers.settings import Setting, check_granted, held
 from drivers.verdict import (
     Verdict,
@@ -195,9 +196,8 @@ def _settle(taker: _Taker, plan: CapturePlan) -> tuple[Verdict, ...]:
 def _record(frame: Frame) -> FrameRecord:
     stride = 4 if frame.pixels.size > 1_000_000 else 1
     sample = frame.pixels[::stride, ::stride]
-    saturated = np.count_nonzero(frame.pixels >= frame.full_scale_counts) / frame.pixels.size
     level = float(sample.mean()) / frame.full_scale_counts
-    return FrameRecord(frame.sequence, frame.timestamp_s, level, float(saturated))
+    return FrameRecord(frame.sequence, frame.timestamp_s, level, saturated_share(frame))
 
 
 def _judge_moments(mean: np.ndarray, std: np.ndarray, plan: CapturePlan, frames: int) -> tuple[Verdict, ...]:

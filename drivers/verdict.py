@@ -86,7 +86,7 @@ def judge_saturation(saturated: Sequence[float], exposure_s: float | None) -> Ve
         "saturation",
         worst <= MAX_SATURATED,
         worst,
-        f"at most {MAX_SATURATED:g} of the pixels at full scale",
+        f"at most {MAX_SATURATED:g} of the pixels at full scale, or piled up on the highest count",
         f"Shorten the exposure{now} or close the aperture; a saturated pixel has no shift.",
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 from app.errors import AirlensError
 from app.files.durable import write_durably
 from drivers.protocols import Camera, Frame
+from drivers.saturation import saturated_share
 from drivers.verdict import Verdict, judge_images, judge_saturation
 
 
@@ -38,10 +39,9 @@ class FrameQuality:
 def judge_frame(camera: Camera, frame: Frame) -> FrameQuality:
     """Return the quality of one frame; temporal noise needs a burst and is left out."""
     image = (frame.pixels / np.float32(frame.full_scale_counts)).astype(np.float32)
-    saturated = float(np.mean(frame.pixels >= frame.full_scale_counts))
     judged = judge_images(image, np.zeros_like(image), 1)
     kept = [verdict for verdict in judged if verdict.name != "temporal noise"]
-    return FrameQuality(frame.sequence, (*kept, judge_saturation([saturated], camera.exposure_s)))
+    return FrameQuality(frame.sequence, (*kept, judge_saturation([saturated_share(frame)], camera.exposure_s)))
 
 
 def write_picture(path: Path, frame: Frame, longest_px: int = 1600) -> None:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from drivers.protocols import Frame, Pixels
+from drivers.saturation import saturated_share
 
 BINS = 64
 JPEG_QUALITY = 80
@@ -47,7 +48,7 @@ def statistics_of(frame: Frame) -> Statistics:
     mean_counts = float(counts.mean())
     return Statistics(
         mean=mean_counts / full,
-        saturated=float(np.count_nonzero(counts >= full)) / counts.size,
+        saturated=saturated_share(frame, every=2),
         dark=float(np.count_nonzero(counts == 0)) / counts.size,
         sharpness_nd=_sharpness(frame.pixels, mean_counts),
         histogram=tuple(int(n) for n in histogram),
