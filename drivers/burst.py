@@ -20,10 +20,10 @@ CaptureRole = Literal["reference", "flow", "dark", "flat"]
 class CapturePlan:
     """A burst as data. `exposure_s` and `gain` hold for this burst; left at None they are the operator's.
 
-    `settle_s` is waited first; then frames are discarded until two in a row are equally bright, at most
-    `settle_frames` of them. `max_refused` ends a burst whose camera keeps losing frames. `refresh_hz` is
-    the projector's: exposures that are not a whole number of its periods are warned of. `raw_stack` keeps
-    every frame.
+    `settle_s` is waited first; then frames are discarded until a change of the settings has acted and two in a row
+    are equally bright, at most `settle_frames` of them. `max_refused` ends a burst whose camera keeps losing
+    frames. `refresh_hz` is the projector's: exposures that are not a whole number of its periods are warned of.
+    `raw_stack` keeps every frame.
     """
 
     role: CaptureRole = "reference"

@@ -16,7 +16,7 @@ from drivers.errors import DeviceNotFoundError, DeviceTimeoutError, FrameError, 
 from drivers.moments import RunningMoments
 from drivers.protocols import Camera, CameraInfo, Frame
 from drivers.saturation import saturated_share
-from drivers.settings import Setting, check_granted, held
+from drivers.settings import Setting, check_granted, held, is_settled
 from drivers.verdict import (
     Verdict,
     judge_beat,
@@ -172,13 +172,16 @@ class _Taker:
 
 
 def _settle(taker: _Taker, plan: CapturePlan) -> tuple[Verdict, ...]:
-    """Discard frames until two in a row have the same brightness; cameras differ in how long that takes."""
+    """Discard frames until two in a row have the same brightness; cameras differ in how long that takes.
+
+    Two that came before a change of exposure acted are alike too, so the frames right after one are not compared.
+    """
     before, change = None, float("inf")
     for _ in range(plan.settle_frames):
         if taker.outcome is not BurstOutcome.COMPLETE:
             return ()
         frame = taker.take()
-        if frame is None:
+        if frame is None or not is_settled(frame):
             continue
         level = _record(frame).level
         change = abs(level - before) / max(level, 1e-9) if before is not None else change

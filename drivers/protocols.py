@@ -13,24 +13,27 @@ Pixels = UInt16[np.ndarray, "rows cols"] | UInt8[np.ndarray, "rows cols"]
 class Frame:
     """One raw frame as the camera gave it, never resampled.
 
-    `full_scale_counts` is the largest count that the format can hold (4095 for 12 bit).
+    `full_scale_counts` is the largest count that the format can hold (4095 for 12 bit). `since_change` counts the
+    frames between the first one after exposure or gain was changed and this one: the first of them may still have
+    the old exposure. None where nothing was changed.
     """
 
     pixels: Pixels
     sequence: int
     timestamp_s: float
     full_scale_counts: int
+    since_change: int | None = None
 
 
 @dataclass(frozen=True)
 class CameraInfo:
-    """What is known of a camera: settings as read back from it, not as asked."""
+    """What is known of a camera: settings as read back from it, not as asked. A rate of None is unknown."""
 
     name: str
     width_px: int
     height_px: int
     bits: int
-    frame_rate_hz: float
+    frame_rate_hz: float | None
     settings: dict[str, float | int | str] = field(default_factory=dict)
 
 

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from drivers.errors import DeviceError, DeviceSettingError
-from drivers.protocols import Camera
+from drivers.gate import CONTROL_FRAMES
+from drivers.protocols import Camera, Frame
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,19 @@ def held(
                 None if exposure_s is None else before[0],
                 None if gain is None else before[1],
             )
+
+
+def is_settled(frame: Frame) -> bool:
+    """Return whether a frame was taken with the settings that its camera has: cameras obey some frames late."""
+    return frame.since_change is None or frame.since_change >= CONTROL_FRAMES
+
+
+def grab_settled(camera: Camera) -> Frame:
+    """Return a fresh frame that was taken with the settings that the camera has. Raises as `Camera.grab` does."""
+    frame = camera.grab()
+    while not is_settled(frame):
+        frame = camera.grab()
+    return frame
 
 
 def check_granted(settings: tuple[Setting, ...]) -> None:

@@ -195,7 +195,8 @@ def take_order(
     Raises DeviceSettingError for times that cannot be kept.
     """
     starts_s = evenly(order.bursts, order.every_s)
-    check_times(starts_s, order.plan.frames / camera.info.frame_rate_hz)
+    rate_hz = camera.info.frame_rate_hz
+    check_times(starts_s, order.plan.frames / rate_hz if rate_hz else 0.0)
     taken: list[TakenBurst] = []
     name = name or new_id(experiment.captures_folder, order.plan.role)
 

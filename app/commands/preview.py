@@ -26,12 +26,12 @@ def preview(
     from app.experiment.views import view_number
     from app.rig.frame_report import judge_frame, write_picture
     from app.rig.open import open_camera
-    from drivers.settings import held
+    from drivers.settings import grab_settled, held
 
     opened = open_experiment(experiment)
     number = view_number(opened, view)
     with open_camera(opened, "still", number) as camera, held(camera, exposure_s):
-        frame = camera.grab()
+        frame = grab_settled(camera)
         quality = judge_frame(camera, frame)
         info = camera.info
     if out is not None:

@@ -41,7 +41,9 @@ def judge_frame(camera: Camera, frame: Frame) -> FrameQuality:
     image = (frame.pixels / np.float32(frame.full_scale_counts)).astype(np.float32)
     judged = judge_images(image, np.zeros_like(image), 1)
     kept = [verdict for verdict in judged if verdict.name != "temporal noise"]
-    return FrameQuality(frame.sequence, (*kept, judge_saturation([saturated_share(frame)], camera.exposure_s)))
+    return FrameQuality(
+        frame.sequence, (*kept, judge_saturation([saturated_share(frame)], camera.exposure_s))
+    )
 
 
 def write_picture(path: Path, frame: Frame, longest_px: int = 1600) -> None:

@@ -16,7 +16,6 @@ from drivers.gate import Arrival, FrameGate
 from drivers.protocols import CameraInfo, Frame, Pixels
 
 BUFFERS = 16
-MIN_TIMEOUT_S = 1.0
 # GigE Vision counts frames from 1 to this, and begins again.
 LAST_SHORT_ID = 0xFFFF
 # Significant bits by the format's name in the standard.
@@ -63,7 +62,7 @@ class AravisCamera:
             self._request.width_px,
             self._request.height_px,
             self._bits,
-            1 / self._period_s,
+            None if self._gate.period_s is None else 1 / self._gate.period_s,
             settings,
         )
 
@@ -84,6 +83,7 @@ class AravisCamera:
         self._ask("arv_camera_set_exposure_time", 1e6 * value)
         self._check_granted("exposure", value, self.exposure_s)
         self._exposed_s = value
+        self._gate.note_change(value)
 
     @property
     def gain(self) -> float | None:
@@ -96,6 +96,7 @@ class AravisCamera:
     def gain(self, value: float) -> None:
         self._ask("arv_camera_set_gain", value)
         self._check_granted("gain", value, self.gain)
+        self._gate.note_change(self.exposure_s)
 
     def grab(self) -> Frame:
         """Return the next frame whose exposure begins after this call."""
@@ -158,17 +159,27 @@ class AravisCamera:
         self._check_size(self._pair("arv_camera_get_region", c_int(), c_int()), at_most=False)
         if wanted.automatics_off:
             self._switch_automatics_off()
-        if self._ask("arv_camera_is_frame_rate_available"):
-            if wanted.frame_rate_hz is not None:
-                self._ask("arv_camera_set_frame_rate", wanted.frame_rate_hz)
-            self._period_s = 1 / self._ask("arv_camera_get_frame_rate")
-        else:
-            self._period_s = self.exposure_s or MIN_TIMEOUT_S
+        if wanted.frame_rate_hz is not None and self._ask("arv_camera_is_frame_rate_available"):
+            self._ask("arv_camera_set_frame_rate", wanted.frame_rate_hz)
+        self._gate = self._new_gate()
         if wanted.exposure_s is not None:
             self.exposure_s = wanted.exposure_s
         if wanted.gain is not None:
             self.gain = wanted.gain
+        self._gate.note_change(self.exposure_s)
         self._bits = wanted.bits or FORMATS[wanted.pixel_format]
+
+    def _new_gate(self) -> FrameGate:
+        item = 1 if FORMATS[self._request.pixel_format] == 8 else 2
+        known = self._ask("arv_camera_is_frame_rate_available")
+        rate_hz = self._ask("arv_camera_get_frame_rate") if known else 0.0
+        # The camera numbers every frame that it takes: a loss shows in the numbers. The library's stamps are those of
+        # a busy machine, and tell nothing of it.
+        return FrameGate(
+            self._request.width_px * self._request.height_px * item,
+            1 / rate_hz if rate_hz > 0 else None,
+            late_factor=math.inf,
+        )
 
     def _switch_automatics_off(self) -> None:
         for name, switch in (("exposure_auto", "exposure_time_auto"), ("gain_auto", "gain_auto")):
@@ -181,21 +192,15 @@ class AravisCamera:
         self._stream = self._ask("arv_camera_create_stream", None, None)
         for _ in range(BUFFERS):
             library().arv_stream_push_buffer(self._stream, library().arv_buffer_new_allocate(payload))
-        item = 1 if FORMATS[self._request.pixel_format] == 8 else 2
-        # The camera numbers every frame that it takes: a loss shows in the numbers. The library's stamps are those of
-        # a busy machine, and tell nothing of it.
-        self._gate = FrameGate(
-            self._request.width_px * self._request.height_px * item, self._period_s, late_factor=math.inf
-        )
         self._last_id: int | None = None
         self._sequence = 0
         self._is_short = bool(library().arv_camera_is_gv_device(self._opened()))
-        self._exposed_s = self.exposure_s or self._period_s
+        self._exposed_s = self.exposure_s or self._gate.period_s or 0.0
         self._ask("arv_camera_start_acquisition")
 
     def _next(self) -> tuple[Arrival, np.ndarray]:
         """The next buffer, its data copied, the buffer itself back in the ring."""
-        timeout_s = max(MIN_TIMEOUT_S, 3 * self._period_s)
+        timeout_s = self._gate.patience_s
         camera, stream = self._opened(), self._stream
         buffer = library().arv_stream_timeout_pop_buffer(stream, int(1e6 * timeout_s))
         if buffer is None:
@@ -226,7 +231,8 @@ class AravisCamera:
 
     def _pass(self, arrival: Arrival, data: np.ndarray, *, consecutive: bool) -> Frame:
         self._gate.admit(arrival, consecutive=consecutive)
-        return Frame(self._decoded(data), arrival.sequence, arrival.exposed_s, 2**self._bits - 1)
+        pixels, full_scale = self._decoded(data), 2**self._bits - 1
+        return Frame(pixels, arrival.sequence, arrival.exposed_s, full_scale, self._gate.since_change)
 
     def _decoded(self, data: np.ndarray) -> Pixels:
         rows, columns = self._request.height_px, self._request.width_px

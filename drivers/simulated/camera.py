@@ -23,6 +23,8 @@ from drivers.simulated.sensor import ExpectedCounts, Luminance, SensorNoise
 
 TIMEOUT_S = 2.0
 BUFFERS = 4
+# So many frames after a change of exposure or gain are still taken as before, as many UVC cameras do.
+LATENCY_FRAMES = 5
 _THREADED_FROM_PX = 1_000_000
 
 
@@ -31,7 +33,7 @@ class SimulatedCamera:
 
     `shift_px` = (columns, rows) may be set between exposures: drift of the whole image, exact to a small
     part of a pixel. `flicker` is the share (rms) by which the light changes from frame to frame. Without a `clock` of
-    the system's, time is simulated and no grab waits.
+    the system's, time is simulated and no grab waits. A new exposure or gain acts `LATENCY_FRAMES` late.
     """
 
     def __init__(
@@ -52,6 +54,7 @@ class SimulatedCamera:
         self._view, self._moving, self._seed, self._noise = view, moving, seed, noise or SensorNoise()
         self._full_well_exposure_s = self._exposure_s = exposure_s
         self._gain, self._frame_rate_hz, self._name = 1.0, frame_rate_hz, name
+        self._before, self._acts_from = (exposure_s, 1.0), 0
         self._clock, self._faults, self._flicker = clock or VirtualClock(), faults, flicker
         self._luminance = view()
         self._made_s = self._clock.now_s()
@@ -85,8 +88,10 @@ class SimulatedCamera:
     def exposure_s(self, value: float) -> None:
         if not 1e-6 <= value <= 10.0:
             raise DeviceSettingError(f"Exposure {value:g} s is not possible; expected 1e-06 to 10 s.")
+        before = self._in_force(self._next)
         self._exposure_s = value
-        self._start()
+        self._begin()
+        self._change(before)
 
     @property
     def gain(self) -> float:
@@ -97,7 +102,9 @@ class SimulatedCamera:
     def gain(self, value: float) -> None:
         if not 1.0 <= value <= 16.0:
             raise DeviceSettingError(f"Gain {value:g} is not possible; expected 1 to 16.")
+        before = self._in_force(self._next)
         self._gain = value
+        self._change(before)
 
     @property
     def gate(self) -> FrameGate:
@@ -138,10 +145,25 @@ class SimulatedCamera:
         return self._draw(sequence)
 
     def _start(self) -> None:
+        size = self._luminance.size * np.dtype(self._noise.dtype).itemsize
+        self._gate = FrameGate(size, 1 / self._frame_rate_hz, self._exposure_s)
+        self._acts_from, self._gone = 0, False
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin to count frames anew; an exposure that is longer than the period stretches it."""
         self._period_s = max(1 / self._frame_rate_hz, self._exposure_s)
         self._started_s = self._clock.now_s()
-        self._next, self._uncounted, self._gone = 0, 0, False
-        self._gate = FrameGate(self._luminance.size * np.dtype(self._noise.dtype).itemsize, self._period_s)
+        self._next, self._uncounted = 0, 0
+        self._gate.restart()
+
+    def _change(self, before: tuple[float, float]) -> None:
+        self._before, self._acts_from = before, self._next + LATENCY_FRAMES
+        self._gate.note_change(self._exposure_s)
+
+    def _in_force(self, index: int) -> tuple[float, float]:
+        """Exposure and gain that a frame is taken with."""
+        return (self._exposure_s, self._gain) if index >= self._acts_from else self._before
 
     def _receive(self, fresh_after_s: float | None) -> Frame:
         """Return the next buffer that is fresh enough; with None, the next buffer must be consecutive."""
@@ -153,7 +175,8 @@ class SimulatedCamera:
         pixels = self._draw(index)
         if damaged:  # never reached while the gate does its work
             pixels[len(pixels) // 2 :] = 0
-        return Frame(pixels, arrival.sequence, arrival.exposed_s, self._noise.full_scale_counts)
+        full_scale = self._noise.full_scale_counts
+        return Frame(pixels, arrival.sequence, arrival.exposed_s, full_scale, self._gate.since_change)
 
     def _deliver(self) -> tuple[int, Arrival, bool]:
         """Return the number of the next frame that reaches the buffers, and what the buffer says."""
@@ -193,11 +216,12 @@ class SimulatedCamera:
                 f"The view is now {luminance.shape} instead of {self._luminance.shape} (rows, columns). "
                 "A camera keeps its size: make a new one for a new size."
             )
-        key = (id(luminance), self._exposure_s, self._gain, self.shift_px)
+        exposure_s, gain = self._in_force(index)
+        key = (id(luminance), exposure_s, gain, self.shift_px)
         if self._expected is None or self._expected[0] != key:
             moved = luminance if self.shift_px == (0.0, 0.0) else shift_image(luminance, self.shift_px)
-            factor = self._exposure_s / self._full_well_exposure_s
-            self._expected = key, ExpectedCounts.of(moved, self._noise, factor, self._gain)
+            factor = exposure_s / self._full_well_exposure_s
+            self._expected = key, ExpectedCounts.of(moved, self._noise, factor, gain)
             self._luminance = luminance  # held, so that its id is not given to another array
         brightness = self._brightness(index)
         if luminance.size < _THREADED_FROM_PX:

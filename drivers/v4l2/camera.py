@@ -19,8 +19,6 @@ from drivers.v4l2.negotiation import negotiate_format, negotiate_period_s
 from drivers.v4l2.node import Node
 from drivers.v4l2.stream import Filled, Stream
 
-MIN_TIMEOUT_S = 1.0
-
 
 @dataclass(frozen=True)
 class V4l2Request:
@@ -57,9 +55,9 @@ class V4l2Camera:
         name = self._identity[0].decode() if self._identity else ""
         settings: dict[str, float | int | str] = dict(self._controls.values())
         settings["pixel_format"] = self._format.code
-        return CameraInfo(
-            name, self._geometry.cols, self._geometry.rows, self._bits, 1 / self._period_s, settings
-        )
+        period_s = self._gate.period_s
+        rate_hz = None if period_s is None else 1 / period_s
+        return CameraInfo(name, self._geometry.cols, self._geometry.rows, self._bits, rate_hz, settings)
 
     @property
     def controls(self) -> Controls:
@@ -85,6 +83,7 @@ class V4l2Camera:
                 f"{self._request.device} has no exposure control. Leave exposure_s out of the plan."
             )
         self._controls.set(abi.CID_EXPOSURE_ABSOLUTE, round(value / abi.EXPOSURE_UNIT_S))
+        self._gate.note_change(self.exposure_s)
 
     @property
     def gain(self) -> float | None:
@@ -100,6 +99,7 @@ class V4l2Camera:
                 f"{self._request.device} has no gain control. Leave gain out of the plan."
             )
         self._controls.set(found, round(value))
+        self._gate.note_change(self.exposure_s)
 
     def grab(self) -> Frame:
         """Return the next frame whose exposure begins after this call."""
@@ -161,11 +161,12 @@ class V4l2Camera:
             self._geometry = negotiate_format(
                 self._node, wanted.pixel_format, wanted.width_px, wanted.height_px
             )
-            self._period_s = negotiate_period_s(self._node, wanted.frame_rate_hz)
+            self._driver = about.driver
+            period_s = negotiate_period_s(self._node, wanted.frame_rate_hz)
             self._controls = Controls(self._node)
-            self._apply_settings()
             self._bits = self._request.bits or self._format.bits
-            self._gate = FrameGate(self._format.bytes_needed(self._geometry), self._period_s)
+            self._gate = FrameGate(self._format.bytes_needed(self._geometry), period_s)
+            self._apply_settings()
             self._stream = Stream(self._node)
         except BaseException:
             self.close()
@@ -178,6 +179,7 @@ class V4l2Camera:
             self.exposure_s = self._request.exposure_s
         if self._request.gain is not None:
             self.gain = self._request.gain
+        self._gate.note_change(self.exposure_s)
 
     def _gain_control(self) -> int | None:
         known = (abi.CID_GAIN, abi.CID_ANALOGUE_GAIN)
@@ -189,14 +191,13 @@ class V4l2Camera:
         return self._stream
 
     def _dequeue(self) -> Filled:
-        timeout_s = max(MIN_TIMEOUT_S, 3 * self._period_s)
-        return self._running().dequeue(timeout_s)
+        return self._running().dequeue(self._gate.patience_s)
 
     def _arrival(self, filled: Filled) -> Arrival:
-        before_s = 0.0 if filled.at_start else (self.exposure_s or self._period_s)
+        length_s = self.exposure_s or self._gate.period_s or 0.0
         return Arrival(
             filled.sequence,
-            filled.timestamp_s - before_s,
+            exposed_s(filled, length_s, self._driver),
             bool(filled.flags & abi.BUF_FLAG_ERROR),
             filled.data.size,
         )
@@ -204,4 +205,14 @@ class V4l2Camera:
     def _pass(self, filled: Filled, arrival: Arrival, *, consecutive: bool) -> Frame:
         self._gate.admit(arrival, consecutive=consecutive)
         pixels = self._format.decode(filled.data, self._geometry)
-        return Frame(pixels, filled.sequence, filled.timestamp_s, 2**self._bits - 1)
+        full_scale = 2**self._bits - 1
+        return Frame(pixels, filled.sequence, filled.timestamp_s, full_scale, self._gate.since_change)
+
+
+def exposed_s(filled: Filled, length_s: float, driver: bytes) -> float:
+    """Return when the exposure of a buffer began, that took `length_s`; at the earliest where the stamp is unsure.
+
+    uvcvideo always says "start of exposure", and unless it is told otherwise stamps a frame when its first bytes
+    arrive: after its exposure.
+    """
+    return filled.timestamp_s - (0.0 if filled.at_start and driver != b"uvcvideo" else length_s)

@@ -5,8 +5,6 @@ from drivers.v4l2 import abi
 from drivers.v4l2.formats import Geometry
 from drivers.v4l2.node import Node
 
-UNKNOWN_RATE_HZ = 30.0
-
 
 def negotiate_format(node: Node, code: str, width_px: int, height_px: int) -> Geometry:
     """Return the geometry of the format that was asked for. Raises DeviceSettingError for a substitute."""
@@ -25,16 +23,21 @@ def negotiate_format(node: Node, code: str, width_px: int, height_px: int) -> Ge
     return Geometry(pix.height, pix.width, pix.bytesperline)
 
 
-def negotiate_period_s(node: Node, rate_hz: float | None) -> float:
-    """Return the time from frame to frame; sets the rate when one is given. Raises DeviceSettingError."""
+def negotiate_period_s(node: Node, rate_hz: float | None) -> float | None:
+    """Return the time from frame to frame, None where the driver does not say; sets the rate when one is given.
+
+    Raises DeviceSettingError.
+    """
     parameters = abi.StreamParm(type=abi.BUF_TYPE_VIDEO_CAPTURE)
     if rate_hz is not None:
         parameters.timeperframe = abi.Fract(1000, round(1000 * rate_hz))
-        node.call(abi.VIDIOC_S_PARM, parameters)
-    node.call(abi.VIDIOC_G_PARM, parameters)
+        if not node.knows(abi.VIDIOC_S_PARM, parameters):
+            raise DeviceSettingError(f"{node.path} has no frame rate to set. Leave frame_rate_hz out.")
+    if not node.knows(abi.VIDIOC_G_PARM, parameters):
+        return None
     period = parameters.timeperframe
     if not period.numerator or not period.denominator:
-        return 1 / (rate_hz or UNKNOWN_RATE_HZ)  # the driver does not say; only time limits depend on it
+        return None if rate_hz is None else 1 / rate_hz
     granted_hz = period.denominator / period.numerator
     if rate_hz is not None and abs(granted_hz - rate_hz) > 0.01 * rate_hz:
         raise DeviceSettingError(

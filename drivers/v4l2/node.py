@@ -31,6 +31,16 @@ class Node:
         except OSError as error:
             raise explain(error, self.path) from error
 
+    def knows(self, request: int, argument: ctypes.Structure) -> bool:
+        """Send one request as `call` does; return False where the driver does not know it at all."""
+        try:
+            self.call(request, argument)
+        except DeviceError as error:
+            if isinstance(error.__cause__, OSError) and error.__cause__.errno == errno.ENOTTY:
+                return False
+            raise
+        return True
+
     def enumerate(self, request: int, make: Callable[[int], S]) -> Iterator[S]:
         """Yield the answers to a request that counts its `index` up until the kernel says EINVAL."""
         index = 0

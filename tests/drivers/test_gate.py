@@ -1,7 +1,7 @@
 import pytest
 
 from drivers.errors import FrameError, FrameFault
-from drivers.gate import Arrival, FrameGate
+from drivers.gate import CONTROL_FRAMES, Arrival, FrameGate
 
 
 def arrival(sequence, exposed_s, flagged=False, bytes_used=100):
@@ -52,3 +52,37 @@ def test_old_buffers_are_stale():
     assert refusal(gate, arrival(4, 0.16), consecutive=False)[0] is FrameFault.STALE
     assert gate.is_stale(arrival(6, 0.24), fresh_after_s=1.0)
     assert not gate.is_stale(arrival(7, 1.0), fresh_after_s=1.0)
+
+
+def test_a_long_exposure_takes_whole_periods_and_what_comes_in_them_is_not_late():
+    gate = FrameGate(100, 1 / 30)
+    gate.note_change(4 / 60)
+    assert gate.period_s == pytest.approx(2 / 30)
+    assert gate.patience_s == 1.0
+    for step in range(12):
+        # Some cameras need one period more than the exposure takes.
+        gate.admit(arrival(step, step * 3 / 30), consecutive=True)
+    gate.note_change(1.0)
+    assert gate.patience_s == pytest.approx(3.0)
+    gate.note_change(0.045)
+    assert gate.period_s == pytest.approx(2 / 30)
+
+
+def test_frames_of_the_longer_exposure_before_are_not_late_and_a_loss_names_the_exposure():
+    gate = FrameGate(100, 1 / 30)
+    gate.note_change(0.1)
+    gate.note_change(0.01)
+    assert gate.since_change == 0
+    for step in range(CONTROL_FRAMES):
+        gate.admit(arrival(step, 0.1 * step), consecutive=True)
+    assert gate.since_change == CONTROL_FRAMES - 1
+    with pytest.raises(FrameError, match=r"the period is 0.0333 s at an exposure of 0.01 s"):
+        gate.admit(arrival(CONTROL_FRAMES, 0.1 * CONTROL_FRAMES), consecutive=True)
+
+
+def test_without_a_rate_no_frame_is_late_and_one_is_waited_for_longer():
+    gate = FrameGate(100, None, 2.0)
+    assert gate.period_s is None
+    assert gate.patience_s > 6.0
+    for step in range(3):
+        gate.admit(arrival(step, 4.0 * step), consecutive=True)

@@ -17,6 +17,7 @@ from app.experiment.views import opened_for
 from app.rig.live_camera import CameraState, LiveCamera
 from drivers.protocols import Frame
 from drivers.quick_look import quick_look
+from drivers.settings import grab_settled
 
 router = APIRouter(tags=["devices"])
 
@@ -56,7 +57,7 @@ def _frame(live: LiveCamera) -> Frame:
     if live.status.state is CameraState.capturing and live.newest is not None:
         return live.newest
     with live.using(CameraState.ready) as camera:
-        return camera.grab()
+        return grab_settled(camera)
 
 
 def _image(reference: Path, view: int) -> Float32[np.ndarray, "rows cols"]:

@@ -3,6 +3,7 @@ import pytest
 
 from drivers.errors import DeviceNotFoundError, DeviceTimeoutError, FrameError, FrameFault
 from drivers.protocols import Camera
+from drivers.settings import grab_settled
 from drivers.shift import shift_image
 from drivers.simulated import CameraFault, SensorNoise, SimulatedCamera, VirtualClock
 from tests.drivers.scenes import pattern
@@ -47,11 +48,11 @@ def test_longer_exposure_and_gain_scale_the_signal_until_it_saturates():
     base = camera.grab().pixels.mean()
 
     camera.exposure_s *= 2
-    doubled = camera.grab().pixels.mean()
+    doubled = grab_settled(camera).pixels.mean()
     camera.gain = 16.0
 
     assert doubled == pytest.approx(2 * base, rel=0.01)
-    assert (camera.grab().pixels == 4095).all()
+    assert (grab_settled(camera).pixels == 4095).all()
 
 
 def test_shift_moves_a_sinusoid_by_a_small_fraction_of_a_pixel():

@@ -4,12 +4,15 @@ import ctypes
 import errno
 import os
 
+import numpy as np
 import pytest
 
 from drivers.errors import DeviceBusyError, DeviceNotFoundError, DeviceSettingError
 from drivers.v4l2 import abi, list_devices
-from drivers.v4l2.camera import V4l2Camera, V4l2Request
-from drivers.v4l2.node import explain
+from drivers.v4l2.camera import V4l2Camera, V4l2Request, exposed_s
+from drivers.v4l2.negotiation import negotiate_period_s
+from drivers.v4l2.node import Node, explain
+from drivers.v4l2.stream import Filled
 
 
 @pytest.mark.parametrize(
@@ -66,3 +69,23 @@ def test_an_absent_camera_is_said_and_an_empty_folder_has_none(tmp_path):
     (tmp_path / "video3").write_bytes(b"")
     found = list_devices(tmp_path)[0]
     assert "refused a request" in found.error
+
+
+def test_a_driver_that_knows_no_rate_leaves_it_unknown_and_one_that_is_asked_for_is_refused(tmp_path):
+    (tmp_path / "video0").write_bytes(b"")
+    node = Node(tmp_path / "video0")  # no file knows the request
+    assert negotiate_period_s(node, None) is None
+    with pytest.raises(DeviceSettingError, match="Leave frame_rate_hz out"):
+        negotiate_period_s(node, 30.0)
+    node.close()
+
+
+def test_an_exposure_ends_before_the_stamp_unless_a_driver_stamps_its_start():
+    def filled(flags):
+        return Filled(np.zeros(1, np.uint8), 1, 10.0, flags)
+
+    start, end = filled(abi.BUF_FLAG_TSTAMP_SRC_SOE), filled(0)
+    assert exposed_s(start, 0.5, b"vivid") == 10.0
+    assert exposed_s(end, 0.5, b"vivid") == 9.5
+    # It stamps the arrival, and flags it as the start all the same.
+    assert exposed_s(start, 0.5, b"uvcvideo") == 9.5
