@@ -49,6 +49,8 @@ class AnswerKind(StrEnum):
     """It does not know this command, or not this value."""
     BUSY = "busy"
     """Not now: warming, cooling or switching."""
+    DENIED = "denied"
+    """The password is not the projector's."""
     FAILED = "failed"
     OTHER = "other"
     """Echo, prompt, garbage or news that nobody asked for: keep waiting."""
@@ -67,6 +69,7 @@ OTHER = Answer(AnswerKind.OTHER)
 DONE = Answer(AnswerKind.DONE)
 ABSENT = Answer(AnswerKind.ABSENT)
 BUSY = Answer(AnswerKind.BUSY)
+DENIED = Answer(AnswerKind.DENIED)
 FAILED = Answer(AnswerKind.FAILED)
 
 

@@ -41,7 +41,7 @@ class Exchange:
         """Return an answer that is certain: in doubt, or when refused, two in a row must agree."""
         doubtful, before = self.in_doubt, None
         while True:
-            answer = self._ask_once(request)
+            answer = self.exchange_again(request)
             refused = answer.kind in (AnswerKind.ABSENT, AnswerKind.FAILED)
             if answer == before or not (doubtful or refused):
                 return answer
@@ -62,6 +62,16 @@ class Exchange:
             f"The projector at {self.name} did not answer {request.verb!s} within "
             f"{self._dialect.timeout_s:g} s. Check that it has power and that port and speed are right."
         )
+
+    def exchange_again(self, request: Request) -> Answer:
+        """Exchange what may be sent twice: once more over a new line where the old one is lost.
+
+        Projectors hang up when nobody asked for a while.
+        """
+        try:
+            return self.exchange(request)
+        except DeviceNotFoundError:
+            return self.exchange(request)
 
     def send(self, request: Request) -> None:
         """Send a request; what came before it is dropped."""
@@ -104,12 +114,6 @@ class Exchange:
         """Free the line."""
         self._port.close()
         self._opened = False
-
-    def _ask_once(self, request: Request) -> Answer:
-        try:
-            return self.exchange(request)
-        except DeviceNotFoundError:
-            return self.exchange(request)  # asking twice harms nothing; the line is opened again
 
     def _drop_old(self) -> None:
         """Drop what belongs to no request any more; after a time-out, wait until the line is quiet."""

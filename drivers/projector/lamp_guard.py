@@ -26,14 +26,13 @@ class LampGuard:
         self._min_on_s, self._min_off_s = min_on_s, min_off_s
         self._journal, self._now_s = journal, now_s
         self._times: dict[str, float] = {}
-        if journal is not None and journal.exists():
-            with contextlib.suppress(ValueError, OSError):
-                read = json.loads(journal.read_text(encoding="utf-8"))
-                self._times = {key: float(read[key]) for key in ("on", "off") if key in read}
+        self._before: dict[str, float] = {}
+        self._read()
 
     @property
     def on_s(self) -> float | None:
         """How long the lamp has been on; None when unknown or off."""
+        self._read()
         lit = self._times.get("on")
         if lit is None or lit < self._times.get("off", float("-inf")):
             return None
@@ -55,7 +54,19 @@ class LampGuard:
         """Note that the lamp was put out."""
         self._note("off")
 
+    def not_put_out(self) -> None:
+        """Take the note of `put_out` back: the projector refused."""
+        self._write(self._before)
+
+    def saw(self, *, burning: bool) -> None:
+        """Note what somebody else did with the lamp, as done now: by remote control, or at the projector."""
+        if burning and self.on_s is None:
+            self.lit()
+        if not burning and self.on_s is not None:
+            self.put_out()
+
     def _check(self, key: str, least_s: float, what: str) -> None:
+        self._read()
         since_s = self._now_s() - self._times.get(key, float("-inf"))
         if 0 <= since_s < least_s:
             raise DeviceRefusedError(
@@ -64,7 +75,20 @@ class LampGuard:
             )
 
     def _note(self, key: str) -> None:
-        self._times[key] = self._now_s()
+        self._read()
+        self._before = dict(self._times)
+        self._write(self._times | {key: self._now_s()})
+
+    def _read(self) -> None:
+        """Take over what other programs have noted since."""
+        if self._journal is None or not self._journal.exists():
+            return
+        with contextlib.suppress(ValueError, OSError):
+            read = json.loads(self._journal.read_text(encoding="utf-8"))
+            self._times = {key: float(read[key]) for key in ("on", "off") if key in read}
+
+    def _write(self, times: dict[str, float]) -> None:
+        self._times = times
         if self._journal is not None:
             self._journal.parent.mkdir(parents=True, exist_ok=True)
             temporary = self._journal.with_suffix(".tmp")

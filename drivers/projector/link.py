@@ -27,6 +27,7 @@ _IN_STANDBY = (Capability.LAMP_HOURS, Capability.ERRORS, Capability.NAME)
 _REASONS = {
     AnswerKind.ABSENT: "does not know this command or value; ask its status for what it knows",
     AnswerKind.BUSY: "is busy switching; wait a minute, then repeat",
+    AnswerKind.DENIED: "does not accept the password; set AIRLENS_PROJECTOR_PASSWORD to the projector's own",
     AnswerKind.FAILED: "refused; look at its indicators and at the wire log",
 }
 
@@ -97,9 +98,14 @@ class ProjectorLink:
                     "put out while it ignites is damaged."
                 )
             self._guard.may_put_out()
+            # Noted before it is sent, as the lighting is.
             self._switch(PowerState.COOLING, self._dialect.cooling_s)
-            self._command(Request(Verb.POWER_OFF))
             self._guard.put_out()
+            try:
+                self._command(Request(Verb.POWER_OFF))
+            except DeviceRefusedError:
+                self._guard.not_put_out()
+                raise
 
     def select_source(self, code: str) -> None:
         """Show another input."""
@@ -137,6 +143,8 @@ class ProjectorLink:
             return self._expected() or PowerState.SILENT
         if answer.kind is AnswerKind.BUSY:
             return self._expected() or PowerState.WARMING
+        if answer.kind is AnswerKind.DENIED:
+            raise DeviceRefusedError(f"The projector at {self._line.name} {_REASONS[answer.kind]}.")
         if not isinstance(answer.value, PowerState):
             raise DeviceRefusedError(
                 f"The projector at {self._line.name} refuses to tell its power state. "
@@ -145,9 +153,18 @@ class ProjectorLink:
         warming = self._expected() is PowerState.WARMING and not self._dialect.tells_warming
         if answer.value is PowerState.STANDBY and warming:
             return PowerState.WARMING  # "off" is all that it can say until it is lit
+        self._note_seen(answer.value)
         if answer.value in (PowerState.ON, PowerState.STANDBY):
             self._switching = None
         return answer.value
+
+    def _note_seen(self, power: PowerState) -> None:
+        """Note what the lamp does that was not asked for from here."""
+        lighting = self._expected() is PowerState.WARMING  # it may say "standby" until it has begun
+        if power is PowerState.WARMING:
+            self._guard.saw(burning=True)
+        elif power is PowerState.COOLING or (power is PowerState.STANDBY and not lighting):
+            self._guard.saw(burning=False)
 
     def _ask_all(self, capabilities: tuple[Capability, ...] | dict[Capability, Verb]) -> dict:
         found: dict[Capability, object] = {}
@@ -182,7 +199,7 @@ class ProjectorLink:
             raise DeviceRefusedError("The projector is still warming up. Wait until it is on, then repeat.")
         if self._line.in_doubt:
             self._line.ask(Request(Verb.ASK_POWER))  # replies come in order: late ones are past then
-        answer = self._line.exchange(request)
+        answer = self._line.exchange(request) if switches else self._line.exchange_again(request)
         if answer.kind is AnswerKind.DONE:
             return
         if switches:

@@ -7,7 +7,18 @@ the projector's random number and the password.
 import hashlib
 import re
 
-from drivers.projector.dialect import ABSENT, BUSY, DONE, FAILED, OTHER, Answer, AnswerKind, Request, Verb
+from drivers.projector.dialect import (
+    ABSENT,
+    BUSY,
+    DENIED,
+    DONE,
+    FAILED,
+    OTHER,
+    Answer,
+    AnswerKind,
+    Request,
+    Verb,
+)
 from drivers.projector.protocol import Capability, PowerState
 
 _COMMANDS = {
@@ -57,7 +68,7 @@ class PjLink:
         """Return the meaning of one line; only the answer to this very command counts."""
         text = message.decode("utf-8", "replace").strip()
         if text.upper() == "PJLINK ERRA":
-            return FAILED
+            return DENIED
         head, equals, value = text.partition("=")
         asked = (self.encode(request) or b"").decode()[:6]
         if not equals or head.upper() != asked:
@@ -80,7 +91,9 @@ def greeting_digest(greeting: bytes, password: str) -> bytes | None:
     if match[2] is None:
         return b""
     if not password:
-        raise ValueError("The projector wants a password and none is given. Put it into the rig's settings.")
+        raise ValueError(
+            "The projector wants a password and none is given. Set AIRLENS_PROJECTOR_PASSWORD to it."
+        )
     # The protocol prescribes MD5; it protects no secret of ours.
     digest = hashlib.md5(match[2] + password.encode("utf-8"), usedforsecurity=False)
     return digest.hexdigest().encode("ascii")

@@ -36,18 +36,27 @@ class SimulatedProjector:
     def __init__(
         self, responder: Responder, faults: ProjectorScript = lambda _: None, *, seed: int = 0
     ) -> None:
-        self.responder, self.hung_up, self.commands = responder, False, 0
+        self.responder, self.commands = responder, 0
+        self._hung_up, self._heard_s = False, responder.state.clock.now_s()
         self._faults, self._random = faults, np.random.default_rng(seed)
         self._buffer = b""
         self._outbox: list[tuple[float, bytes]] = []
 
+    @property
+    def hung_up(self) -> bool:
+        """Whether it has closed the line: by a mishap, or because nothing came over it for a while."""
+        idle_s, now_s = self.responder.idle_s, self.responder.state.clock.now_s()
+        return self._hung_up or (idle_s is not None and now_s - self._heard_s > idle_s)
+
     def connect(self) -> None:
         """A line opens."""
-        self.hung_up, self._buffer, self._outbox = False, b"", []
+        self._hung_up, self._buffer, self._outbox = False, b"", []
+        self._heard_s = self.responder.state.clock.now_s()
         self._send(self.responder.greeting())
 
     def feed(self, data: bytes) -> None:
         """Take in bytes from the line."""
+        self._heard_s = self.responder.state.clock.now_s()
         commands, self._buffer = self.responder.split(self._buffer + data)
         for command in commands:
             fault = self._faults(self.commands)
@@ -63,7 +72,7 @@ class SimulatedProjector:
 
     def _respond(self, command: bytes, fault: ProjectorFault | None) -> None:
         if fault is ProjectorFault.HANG_UP:
-            self.hung_up = True
+            self._hung_up = True
             return
         if fault is ProjectorFault.SILENCE:
             return

@@ -14,6 +14,7 @@ class NecTwin:
 
     error = with_checksum(b"\xa2\x00" + _IDS + b"\x02\x02\x0f")
     news = with_checksum(b"\x20\x99" + _IDS + b"\x01\x00")
+    idle_s: float | None = None
 
     def __init__(self, state: TwinState) -> None:
         self.state = state

@@ -14,6 +14,7 @@ class PjLinkTwin(CrCommands):
 
     error = b"%1POWR=ERR4\r"
     news = b"%2LKUP=00:11:22:33:44:55\r"
+    idle_s = 30.0
 
     def __init__(self, state: TwinState, password: str = "", salt: str = "498e4a67") -> None:
         super().__init__(state)

@@ -16,11 +16,15 @@ class Reply:
 
 @runtime_checkable
 class Responder(Protocol):
-    """A dialect from the projector's side. `error` is its way to refuse, `news` what it says unasked."""
+    """A dialect from the projector's side. `error` is its way to refuse, `news` what it says unasked.
+
+    It hangs up when nothing was asked for `idle_s`; None: never.
+    """
 
     state: TwinState
     error: bytes
     news: bytes
+    idle_s: float | None
 
     def greeting(self) -> bytes:
         """Return what is said when a line opens."""
@@ -37,6 +41,8 @@ class Responder(Protocol):
 
 class CrCommands:
     """What the dialects share whose commands end with CR, and who wait to be spoken to."""
+
+    idle_s: float | None = None
 
     def __init__(self, state: TwinState) -> None:
         self.state = state

@@ -91,6 +91,17 @@ def test_the_wire_log_can_be_read(rig):
     assert all(str(entry).isprintable() for entry in link.log.entries)
 
 
+def test_a_line_that_was_closed_while_idle_is_opened_again_for_a_command(rig):
+    name, link, twin, clock = rig
+    light(link, clock, twin)
+    twin.responder.idle_s = 30.0  # as PJLink's projectors do
+    clock.advance_s(31.0)
+    link.select_source(DIALECTS[name][2][1])
+    clock.advance_s(31.0)
+    link.mute(True)
+    assert (twin.responder.state.source, twin.responder.state.muted) == (DIALECTS[name][2][1], True)
+
+
 @pytest.mark.hardware
 def test_a_real_projector_answers_within_its_time(request):
     url = request.config.getoption("--projector")

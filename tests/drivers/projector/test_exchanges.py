@@ -116,6 +116,15 @@ def test_pjlink_without_the_wanted_password_says_so_and_a_stranger_is_told():
         stranger.power()
 
 
+def test_pjlink_says_that_a_password_is_wrong_and_where_it_comes_from():
+    digest = hashlib.md5(b"498e4a67wrong", usedforsecurity=False).hexdigest().encode()
+    for act in (ProjectorLink.power, ProjectorLink.status, ProjectorLink.turn_on):
+        script = [(digest + b"%1POWR ?\r", b"PJLINK ERRA\r")]
+        link, _ = link_of("pjlink", script, greeting=b"PJLINK 1 498e4a67\r", password="wrong")
+        with pytest.raises(DeviceRefusedError, match="AIRLENS_PROJECTOR_PASSWORD"):
+            act(link)
+
+
 def test_benq_echo_prompt_and_block_are_told_apart():
     link, _ = link_of(
         "benq",
