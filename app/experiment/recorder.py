@@ -5,6 +5,7 @@ import os
 import shutil
 import time
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -63,23 +64,30 @@ class CaptureRecorder:
             reserve(folder, plan)
         self.folder, self._checkpoint_s, self._plan = folder, checkpoint_s, plan
         self._saved_s = float("-inf")
+        self._writer = ThreadPoolExecutor(1, "checkpoint")
+        self._saving: Future[float] | None = None
         self._stack = RawStack(folder / "frames.tif") if plan.raw_stack else None
 
     def observe(self, taken: Taken) -> None:
-        """Append to the raw stack; renew the moments when their time has come."""
+        """Append to the raw stack; renew the moments when their time has come.
+
+        They are written beside the burst: while a disk syncs, a camera fills its buffers.
+        """
         if self._stack:
             self._stack.add(taken.frame, taken.record)
-        began_s = time.monotonic()
-        if began_s - self._saved_s < self._checkpoint_s:
+        if self._saving is not None:
+            if not self._saving.done():
+                return
+            self._check()
+            # At most a tenth of the time goes into checkpoints, however slow the disk.
+            self._checkpoint_s = max(self._checkpoint_s, 10 * self._saving.result())
+            self._saved_s, self._saving = time.monotonic(), None
+        if time.monotonic() - self._saved_s < self._checkpoint_s:
             return
         self._check()
-        full_scale = taken.frame.full_scale_counts
-        moments = taken.moments
+        full_scale, moments = taken.frame.full_scale_counts, taken.moments
         image = BurstImage(moments.mean(full_scale), moments.std(full_scale), moments.frames)
-        write_image(self.folder / "partial.tif", image)
-        # A slow disk must not slow the burst down: at most a tenth of the time goes into checkpoints.
-        self._saved_s = time.monotonic()
-        self._checkpoint_s = max(self._checkpoint_s, 10 * (self._saved_s - began_s))
+        self._saving = self._writer.submit(self._save, image)
 
     def keep(self, burst: Burst, origin: Mapping[str, Any] | None = None) -> Path:
         """Finish the folder of a capture of one view. What a device cut short gets no manifest.
@@ -147,7 +155,14 @@ class CaptureRecorder:
                 "Take it again."
             )
 
+    def _save(self, image: BurstImage) -> float:
+        """Write a checkpoint; return how long that took [s]."""
+        began_s = time.monotonic()
+        write_image(self.folder / "partial.tif", image)
+        return time.monotonic() - began_s
+
     def _close(self) -> None:
+        self._writer.shutdown()  # what a last checkpoint could not write, the burst's end cannot either, and says so
         if self._stack:
             self._stack.close()
             self._stack = None

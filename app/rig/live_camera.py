@@ -27,8 +27,10 @@ from drivers.protocols import Camera, Frame
 from drivers.settings import set_on
 
 LONGEST_RATE_HZ = 30.0
-# While this machine computes: enough for the eyes, and a third of the cost.
+# While this machine computes or a capture is taken: enough for the eyes, and a third of the cost.
 BUSY_RATE_HZ = 10.0
+# Of a capture's time, at most this part goes into showing its frames: the camera's buffers fill meanwhile.
+SHOWN_SHARE = 0.2
 ASK_EVERY_S = 1.0
 ANSWER_LIMIT_S = 10.0
 _log = logging.getLogger(__name__)
@@ -146,7 +148,7 @@ class LiveCamera:
         self._wake = threading.Condition()
         self.air = "still"
         self.newest: Frame | None = None
-        self._number = 0
+        self._number, self._rests_until_s = 0, float("-inf")
         self._wishes: dict[str, _Wish] = {}
 
     @property
@@ -287,9 +289,14 @@ class LiveCamera:
         self._tell_state()
 
     def show(self, frame: Frame) -> None:
-        """Show a frame to whoever looks; captures call it with theirs, so that the picture stays alive."""
+        """Show a frame to whoever looks; captures call it with theirs, so that the picture stays alive.
+
+        Of a capture's frames some are shown, so that showing them does not lose others.
+        """
         self.newest = frame
-        if not self._listeners:
+        began_s = time.monotonic()
+        capturing = self._status.state is CameraState.capturing
+        if not self._listeners or (capturing and began_s < self._rests_until_s):
             return
         self._number += 1
         wanted = {*self._stretches.values()} or {False}
@@ -308,6 +315,8 @@ class LiveCamera:
                 # One who cannot look any more keeps neither the others nor a capture from going on.
                 _log.exception("a watcher of the live picture")
                 self.leave(key)
+        rest_s = max(1 / BUSY_RATE_HZ, (time.monotonic() - began_s) / SHOWN_SHARE)
+        self._rests_until_s = began_s + rest_s
 
     def watch(self, key: int, listener: Callable[[LiveFrame], object], stretch: bool = False) -> None:
         """Call `listener` with every frame from now on, from another thread, until `leave(key)`."""

@@ -77,6 +77,34 @@ def test_a_lost_camera_leaves_a_readable_capture_that_is_no_measurement(tmp_path
     assert not (tmp_path / "lost" / "manifest.json").exists()
 
 
+def test_a_slow_disk_holds_up_no_frame_and_the_last_checkpoint_is_whole(tmp_path, monkeypatch):
+    def slow(path, image):
+        time.sleep(0.5)
+        write_image(path, image)
+
+    monkeypatch.setattr("app.experiment.recorder.write_image", slow)
+    plan, waited_s = CapturePlan(frames=30), []
+    recorder = CaptureRecorder(tmp_path / "slow", plan, checkpoint_s=0.0)
+
+    def observe(taken):
+        began_s = time.monotonic()
+        recorder.observe(taken)
+        waited_s.append(time.monotonic() - began_s)
+
+    burst = run_capture(make_camera(), plan, on_frame=observe)
+    assert max(waited_s) < 0.4
+    recorder.leave()
+    assert load_capture(tmp_path / "slow").images[0].frames == 1
+    again = CaptureRecorder(tmp_path / "again", plan, checkpoint_s=0.0)
+    run_capture(make_camera(), plan, on_frame=again.observe)
+    again.keep(burst)
+    assert load_capture(tmp_path / "again").complete
+    gone = CaptureRecorder(tmp_path / "gone", plan, checkpoint_s=0.0)
+    run_capture(make_camera(), plan, on_frame=gone.observe)
+    gone.discard()
+    assert not (tmp_path / "gone").exists()
+
+
 def test_discard_leaves_nothing(tmp_path):
     plan = CapturePlan(raw_stack=True)
     recorder = CaptureRecorder(tmp_path / "gone", plan)

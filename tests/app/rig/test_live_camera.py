@@ -55,6 +55,23 @@ def opened(told: list, **options) -> LiveCamera:
     return camera
 
 
+def test_of_a_capture_s_frames_as_many_are_shown_as_leave_it_time():
+    camera, seen = opened([]), []
+    frame = frame_of(np.zeros((8, 8)))
+    with camera.using():
+        camera.watch(1, lambda shown: (seen.append(time.monotonic()), time.sleep(0.05)))
+        began_s = time.monotonic()
+        while time.monotonic() < began_s + 1.0:
+            camera.show(frame)
+            time.sleep(0.001)
+        camera.leave(1)
+    camera.close()
+    # A fifth of the time at most; the newest is always known.
+    assert 1 <= len(seen) <= 5
+    assert min(np.diff(seen), default=1.0) >= 0.25 - 0.01
+    assert camera.newest is frame
+
+
 def test_watchers_see_frames_and_the_camera_rests_without_them():
     camera, seen = opened([]), []
     arrived = threading.Event()
