@@ -216,5 +216,6 @@ def fourcc(code: str) -> int:
 
 
 def fourcc_text(number: int) -> str:
-    """Return the name of a pixel format, without trailing spaces."""
-    return (number & 0x7FFFFFFF).to_bytes(4, "little").decode("ascii", "replace").rstrip()
+    """Return the name of a pixel format, without trailing spaces; the kernel's own "-BE" marks big-endian ones."""
+    name = (number & 0x7FFFFFFF).to_bytes(4, "little").decode("ascii", "replace").rstrip()
+    return f"{name}-BE" if number & 0x80000000 else name

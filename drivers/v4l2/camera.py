@@ -14,7 +14,7 @@ from drivers.protocols import CameraInfo, Frame
 from drivers.v4l2 import abi
 from drivers.v4l2.controls import Controls
 from drivers.v4l2.formats import pixel_format
-from drivers.v4l2.inventory import captures, list_devices, query
+from drivers.v4l2.inventory import as_text, captures, list_devices, query
 from drivers.v4l2.negotiation import negotiate_format, negotiate_period_s
 from drivers.v4l2.node import Node
 from drivers.v4l2.stream import Filled, Stream
@@ -52,7 +52,7 @@ class V4l2Camera:
     @property
     def info(self) -> CameraInfo:
         """Identity, size and settings as the driver has them now."""
-        name = self._identity[0].decode() if self._identity else ""
+        name = as_text(self._identity[0]) if self._identity else ""
         settings: dict[str, float | int | str] = dict(self._controls.values())
         settings["pixel_format"] = self._format.code
         period_s = self._gate.period_s
@@ -132,7 +132,7 @@ class V4l2Camera:
             except DeviceNotFoundError:
                 self.close()
         raise DeviceNotFoundError(
-            f"{(identity or (b'The camera', b''))[0].decode()} is not back yet. "
+            f"{as_text((identity or (b'The camera', b''))[0])} is not back yet. "
             "Plug it in; `airlens devices` lists what is there."
         )
 
@@ -167,7 +167,7 @@ class V4l2Camera:
             self._bits = self._request.bits or self._format.bits
             self._gate = FrameGate(self._format.bytes_needed(self._geometry), period_s)
             self._apply_settings()
-            self._stream = Stream(self._node)
+            self._stream = Stream(self._node, self._geometry.size_bytes)
         except BaseException:
             self.close()
             raise

@@ -12,11 +12,12 @@ from drivers.protocols import Pixels
 
 @dataclass(frozen=True)
 class Geometry:
-    """Size as granted by the driver; `stride_bytes` from row to row."""
+    """Size as granted by the driver; `stride_bytes` from row to row, `size_bytes` of a buffer at most."""
 
     rows: int
     cols: int
     stride_bytes: int
+    size_bytes: int = 0
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def describe_device(path: Path) -> DeviceDescription | None:
         except DeviceError as error:
             return DeviceDescription(path, path.name, "", "", error=str(error))
     return DeviceDescription(
-        path, about.card.decode(), about.driver.decode(), about.bus_info.decode(), formats, controls
+        path, as_text(about.card), as_text(about.driver), as_text(about.bus_info), formats, controls
     )
 
 
@@ -73,6 +73,11 @@ def query(node: Node) -> abi.DeviceCapability:
     about = abi.DeviceCapability()
     node.call(abi.VIDIOC_QUERYCAP, about)
     return about
+
+
+def as_text(name: bytes) -> str:
+    """Return a driver's name for something; it may be cut off inside a character."""
+    return name.decode("utf-8", "replace")
 
 
 def captures(about: abi.DeviceCapability) -> bool:

@@ -20,7 +20,7 @@ def negotiate_format(node: Node, code: str, width_px: int, height_px: int) -> Ge
             f"{node.path} would give {granted} (field order {pix.field}) instead of {asked}. "
             "Ask for a format and size that `airlens devices` lists."
         )
-    return Geometry(pix.height, pix.width, pix.bytesperline)
+    return Geometry(pix.height, pix.width, pix.bytesperline, pix.sizeimage)
 
 
 def negotiate_period_s(node: Node, rate_hz: float | None) -> float | None:

@@ -14,7 +14,9 @@ from drivers.errors import DeviceNotFoundError, DeviceTimeoutError
 from drivers.v4l2 import abi
 from drivers.v4l2.node import Node, explain
 
-BUFFERS = 4
+# A machine that is busy for a moment loses no frame while the ring has room: so many buffers, within this memory.
+MOST_BUFFERS, LEAST_BUFFERS = 32, 4
+RING_BYTES = 256e6
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,10 @@ class Filled:
 class Stream:
     """A running capture stream; made running, ended by `close`."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, frame_bytes: int) -> None:
         self._node = node
-        request = abi.RequestBuffers(count=BUFFERS, type=abi.BUF_TYPE_VIDEO_CAPTURE, memory=abi.MEMORY_MMAP)
+        count = buffers_for(frame_bytes)
+        request = abi.RequestBuffers(count=count, type=abi.BUF_TYPE_VIDEO_CAPTURE, memory=abi.MEMORY_MMAP)
         node.call(abi.VIDIOC_REQBUFS, request)
         self._maps: list[mmap.mmap] = []
         try:
@@ -124,3 +127,8 @@ class Stream:
     @staticmethod
     def _buffer(index: int) -> abi.Buffer:
         return abi.Buffer(index=index, type=abi.BUF_TYPE_VIDEO_CAPTURE, memory=abi.MEMORY_MMAP)
+
+
+def buffers_for(frame_bytes: int) -> int:
+    """Return how many buffers are asked for; the driver may give fewer."""
+    return int(min(MOST_BUFFERS, max(LEAST_BUFFERS, RING_BYTES // max(frame_bytes, 1))))

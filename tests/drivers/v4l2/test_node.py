@@ -1,5 +1,6 @@
 """What can be known of the layer without a device; the rest runs under tests/hardware."""
 
+import contextlib
 import ctypes
 import errno
 import os
@@ -10,9 +11,10 @@ import pytest
 from drivers.errors import DeviceBusyError, DeviceNotFoundError, DeviceSettingError
 from drivers.v4l2 import abi, list_devices
 from drivers.v4l2.camera import V4l2Camera, V4l2Request, exposed_s
-from drivers.v4l2.negotiation import negotiate_period_s
+from drivers.v4l2.inventory import as_text
+from drivers.v4l2.negotiation import negotiate_format, negotiate_period_s
 from drivers.v4l2.node import Node, explain
-from drivers.v4l2.stream import Filled
+from drivers.v4l2.stream import Filled, buffers_for
 
 
 @pytest.mark.parametrize(
@@ -45,6 +47,39 @@ def test_request_numbers_are_the_kernels():
 def test_pixel_codes_are_four_letters():
     assert abi.fourcc("Y16") == 0x20363159
     assert abi.fourcc_text(0x20363159) == "Y16"
+    assert abi.fourcc_text(0xA0363159) == "Y16-BE"  # the kernel's bit 31: bytes the other way round
+
+
+def test_a_name_that_is_cut_off_inside_a_character_is_still_a_name():
+    assert as_text("Kamera für Wände".encode()[:-4]) == "Kamera für W\ufffd"
+
+
+def test_the_ring_has_room_for_a_moment_within_its_memory():
+    assert buffers_for(640 * 480) == 32
+    assert buffers_for(4096 * 3072 * 2) == 10
+    assert buffers_for(200_000_000) == 4
+
+
+class Granting(Node):
+    """A driver that gives the format that it wants."""
+
+    def __init__(self, path, pixel_format):
+        super().__init__(path)
+        self.gives = pixel_format
+
+    def call(self, request, argument):
+        assert request == abi.VIDIOC_S_FMT
+        argument.fmt.pix.pixelformat = self.gives
+        argument.fmt.pix.sizeimage = 2 * 640 * 480
+
+
+def test_the_big_endian_kin_of_a_format_is_no_substitute_for_it(tmp_path):
+    (tmp_path / "video0").write_bytes(b"")
+    with contextlib.closing(Granting(tmp_path / "video0", abi.fourcc("Y16"))) as node:
+        assert negotiate_format(node, "Y16", 640, 480).size_bytes == 614_400
+    with contextlib.closing(Granting(tmp_path / "video0", abi.fourcc("Y16") | 1 << 31)) as node:
+        with pytest.raises(DeviceSettingError, match="would give Y16-BE 640 x 480"):
+            negotiate_format(node, "Y16", 640, 480)
 
 
 @pytest.mark.parametrize(
