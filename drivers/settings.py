@@ -54,6 +54,16 @@ def held(
             )
 
 
+def bits_of(asked: int | None, pixel_format: str, holds: int) -> int:
+    """Return the digits of a count: as asked, else what the format holds. Raises DeviceSettingError for more."""
+    if asked is not None and asked > holds:
+        raise DeviceSettingError(
+            f"The pixel format {pixel_format} holds {holds} bits; asked were {asked}. State at most "
+            f"{holds}, or choose another format."
+        )
+    return holds if asked is None else asked
+
+
 def is_settled(frame: Frame) -> bool:
     """Return whether a frame was taken with the settings that its camera has: cameras obey some frames late."""
     return frame.since_change is None or frame.since_change >= CONTROL_FRAMES

@@ -83,8 +83,8 @@ class V4l2CameraSettings(Strict):
     """Columns."""
     height_px: Annotated[int, Field(gt=0)]
     """Rows."""
-    bits: Annotated[int, Field(ge=1, le=16)] = 16
-    """Digits of a count."""
+    bits: Annotated[int | None, Field(ge=1, le=16)] = None
+    """Digits of a count, where the camera has fewer than the format; the format's unless given."""
     exposure_s: Annotated[float | None, Field(gt=0, le=60)] = None
     """Exposure of a frame; the camera's own unless given."""
     gain: float | None = None
@@ -112,8 +112,8 @@ class AravisCameraSettings(Strict):
     """Columns."""
     height_px: Annotated[int, Field(gt=0)]
     """Rows."""
-    bits: Annotated[int, Field(ge=1, le=16)] = 8
-    """Digits of a count."""
+    bits: Annotated[int | None, Field(ge=1, le=16)] = None
+    """Digits of a count, where the camera has fewer than the format; the format's unless given."""
     exposure_s: Annotated[float | None, Field(gt=0, le=60)] = None
     """Exposure of a frame; the camera's own unless given."""
     gain: float | None = None

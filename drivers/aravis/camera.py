@@ -14,6 +14,7 @@ from drivers.aravis.library import AUTO_OFF, CONTINUOUS, SUCCESS, AravisRefusedE
 from drivers.errors import DeviceBusyError, DeviceNotFoundError, DeviceSettingError, DeviceTimeoutError
 from drivers.gate import Arrival, FrameGate
 from drivers.protocols import CameraInfo, Frame, Pixels
+from drivers.settings import bits_of
 
 BUFFERS = 16
 # GigE Vision counts frames from 1 to this, and begins again.
@@ -26,7 +27,8 @@ FORMATS = {"Mono16": 16, "Mono14": 14, "Mono12": 12, "Mono10": 10, "Mono8": 8}
 class AravisRequest:
     """What is asked of a camera. `device` is its id as listed, or its address on the network.
 
-    `frame_rate_hz`, `exposure_s` and `gain` stay as they are when None.
+    `frame_rate_hz`, `exposure_s` and `gain` stay as they are when None. `bits` are the significant ones where a
+    camera puts fewer into a wider format; None: the format's.
     """
 
     device: str
@@ -49,6 +51,7 @@ class AravisCamera:
                 f"Pixel format {request.pixel_format!r} is not read here; choose one of {', '.join(FORMATS)}."
             )
         self._request = request
+        self._bits = bits_of(request.bits, request.pixel_format, FORMATS[request.pixel_format])
         self._camera: int | None = None
         self._stream: int | None = None
         self._open()
@@ -167,7 +170,6 @@ class AravisCamera:
         if wanted.gain is not None:
             self.gain = wanted.gain
         self._gate.note_change(self.exposure_s)
-        self._bits = wanted.bits or FORMATS[wanted.pixel_format]
 
     def _new_gate(self) -> FrameGate:
         item = 1 if FORMATS[self._request.pixel_format] == 8 else 2

@@ -11,6 +11,7 @@ from pathlib import Path
 from drivers.errors import DeviceNotFoundError, DeviceSettingError
 from drivers.gate import Arrival, FrameGate
 from drivers.protocols import CameraInfo, Frame
+from drivers.settings import bits_of
 from drivers.v4l2 import abi
 from drivers.v4l2.controls import Controls
 from drivers.v4l2.formats import pixel_format
@@ -24,7 +25,7 @@ from drivers.v4l2.stream import Filled, Stream
 class V4l2Request:
     """What is asked of a camera. `frame_rate_hz`, `exposure_s` and `gain` stay as they are when None.
 
-    `bits` are the significant ones where a camera puts fewer into a wider format (12 in Y16).
+    `bits` are the significant ones where a camera puts fewer into a wider format (12 in Y16); None: the format's.
     """
 
     device: Path
@@ -44,6 +45,7 @@ class V4l2Camera:
     def __init__(self, request: V4l2Request) -> None:
         self._request = request
         self._format = pixel_format(request.pixel_format)
+        self._bits = bits_of(request.bits, request.pixel_format, self._format.bits)
         self._identity: tuple[bytes, bytes] | None = None
         self._node: Node | None = None
         self._stream: Stream | None = None
@@ -164,7 +166,6 @@ class V4l2Camera:
             self._driver = about.driver
             period_s = negotiate_period_s(self._node, wanted.frame_rate_hz)
             self._controls = Controls(self._node)
-            self._bits = self._request.bits or self._format.bits
             self._gate = FrameGate(self._format.bytes_needed(self._geometry), period_s)
             self._apply_settings()
             self._stream = Stream(self._node, self._geometry.size_bytes)

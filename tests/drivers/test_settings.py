@@ -1,11 +1,15 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from drivers.aravis import AravisCamera, AravisRequest
 from drivers.burst import CapturePlan
 from drivers.capture import run_capture
 from drivers.errors import DeviceSettingError
-from drivers.settings import grab_settled, held
+from drivers.settings import bits_of, grab_settled, held
 from drivers.simulated import CameraFault, SimulatedCamera
+from drivers.v4l2 import V4l2Camera, V4l2Request
 from tests.drivers.scenes import pattern
 
 
@@ -76,3 +80,12 @@ def test_an_exposure_longer_than_the_frame_period_stretches_it_and_loses_no_fram
         burst = run_capture(camera, CapturePlan(frames=8, exposure_s=periods / 60))
         assert burst.frames == 8
         assert not burst.refused
+
+
+def test_bits_are_the_format_s_unless_fewer_are_stated_and_more_are_refused_before_a_camera_is_opened():
+    assert bits_of(None, "GREY", 8) == 8
+    assert bits_of(12, "Y16", 16) == 12
+    with pytest.raises(DeviceSettingError, match="GREY holds 8 bits; asked were 16"):
+        V4l2Camera(V4l2Request(Path("/dev/video0"), 640, 480, pixel_format="GREY", bits=16))
+    with pytest.raises(DeviceSettingError, match="Mono12 holds 12 bits"):
+        AravisCamera(AravisRequest("none", 64, 64, pixel_format="Mono12", bits=14))
