@@ -83,10 +83,12 @@ class AravisCamera:
 
     @exposure_s.setter
     def exposure_s(self, value: float) -> None:
+        before_s = self.exposure_s
         self._ask("arv_camera_set_exposure_time", 1e6 * value)
         self._check_granted("exposure", value, self.exposure_s)
         self._exposed_s = value
-        self._gate.note_change(value)
+        if self.exposure_s != before_s:
+            self._gate.note_change(value)
 
     @property
     def gain(self) -> float | None:
@@ -97,9 +99,11 @@ class AravisCamera:
 
     @gain.setter
     def gain(self, value: float) -> None:
+        before = self.gain
         self._ask("arv_camera_set_gain", value)
         self._check_granted("gain", value, self.gain)
-        self._gate.note_change(self.exposure_s)
+        if self.gain != before:
+            self._gate.note_change(self.exposure_s)
 
     def grab(self) -> Frame:
         """Return the next frame whose exposure begins after this call."""

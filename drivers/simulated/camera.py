@@ -88,6 +88,8 @@ class SimulatedCamera:
     def exposure_s(self, value: float) -> None:
         if not 1e-6 <= value <= 10.0:
             raise DeviceSettingError(f"Exposure {value:g} s is not possible; expected 1e-06 to 10 s.")
+        if value == self._exposure_s:
+            return
         before = self._in_force(self._next)
         self._exposure_s = value
         self._begin()
@@ -102,6 +104,8 @@ class SimulatedCamera:
     def gain(self, value: float) -> None:
         if not 1.0 <= value <= 16.0:
             raise DeviceSettingError(f"Gain {value:g} is not possible; expected 1 to 16.")
+        if value == self._gain:
+            return
         before = self._in_force(self._next)
         self._gain = value
         self._change(before)

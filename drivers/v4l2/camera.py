@@ -84,8 +84,10 @@ class V4l2Camera:
             raise DeviceSettingError(
                 f"{self._request.device} has no exposure control. Leave exposure_s out of the plan."
             )
+        before_s = self.exposure_s
         self._controls.set(abi.CID_EXPOSURE_ABSOLUTE, round(value / abi.EXPOSURE_UNIT_S))
-        self._gate.note_change(self.exposure_s)
+        if self.exposure_s != before_s:
+            self._gate.note_change(self.exposure_s)
 
     @property
     def gain(self) -> float | None:
@@ -100,8 +102,10 @@ class V4l2Camera:
             raise DeviceSettingError(
                 f"{self._request.device} has no gain control. Leave gain out of the plan."
             )
+        before = self.gain
         self._controls.set(found, round(value))
-        self._gate.note_change(self.exposure_s)
+        if self.gain != before:
+            self._gate.note_change(self.exposure_s)
 
     def grab(self) -> Frame:
         """Return the next frame whose exposure begins after this call."""

@@ -7,6 +7,7 @@ import pytest
 
 from drivers.burst import BurstOutcome, CapturePlan
 from drivers.capture import run_capture
+from drivers.gate import CONTROL_FRAMES
 from drivers.protocols import Camera
 from drivers.simulated import SimulatedCamera
 from drivers.v4l2 import V4l2Camera, V4l2Request, list_devices
@@ -82,6 +83,26 @@ def test_a_burst_is_whole(camera):
     burst = run_capture(camera, CapturePlan(frames=10))
     assert burst.outcome is BurstOutcome.COMPLETE
     assert burst.frames == 10
+
+
+def test_frames_are_counted_from_a_change_of_exposure_on_and_a_burst_waits_for_it_to_act(camera):
+    own_s = camera.exposure_s
+    if own_s is None:
+        pytest.skip("no exposure to change")
+    camera.grab()
+    camera.exposure_s = 2 * own_s
+    frames = [camera.grab(), camera.follow(), camera.follow()]
+    assert [frame.since_change for frame in frames] == [0, 1, 2]
+    camera.exposure_s = 2 * own_s  # as it is: no change
+    assert camera.follow().since_change == 3
+    taken = []
+    burst = run_capture(
+        camera,
+        CapturePlan(frames=4, exposure_s=own_s),
+        on_frame=lambda one: taken.append(one.frame.since_change),
+    )
+    assert burst.outcome is BurstOutcome.COMPLETE
+    assert min(taken) >= CONTROL_FRAMES
 
 
 def test_it_can_be_closed_twice_and_opened_again(camera):
