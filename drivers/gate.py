@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from drivers.errors import FrameError, FrameFault
 
-# So many frames after a change of exposure or gain every camera obeys it; UVC cameras take three to six.
+# So many frames after a change of exposure or gain a camera obeys it; several late is usual over USB.
 CONTROL_FRAMES = 8
 MIN_PATIENCE_S = 1.0
 # A camera whose rate is unknown may be slow.
