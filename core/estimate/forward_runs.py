@@ -159,7 +159,9 @@ def march_under(
         if doing is not None:
             row = {"doing": doing, "model_s": state.model_s, "change": state.change}
             under_way = counted * min(1.0, state.model_s / timing.longest_s)
-            marches.tell(row, lambda: _growing(where, state, model, vertices), under_way=under_way)
+            # A first window that is not finite has no mean.
+            growing = (lambda: _growing(where, state, model, vertices)) if state.means else None
+            marches.tell(row, growing, under_way=under_way)
 
     done = marches.run(flow, model, timing, counted=counted, on_window=passed)
     if doing is not None:
