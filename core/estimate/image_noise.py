@@ -31,7 +31,7 @@ _FARTHEST = 3.0
 class Images(eqx.Module):
     """Shifts of all views: measured, as a room predicts them, and their noise's variance as what it leaves shows.
 
-    What the camera may have done, or another error that the windows share, is taken out of both (`unshared`).
+    What the camera may have done, or another error that the windows share, is taken out of both (`projected`).
     `known` is the share that the noise's power may be wrong by, one standard deviation.
     """
 
@@ -50,7 +50,7 @@ def images(data: Observations, fields: RoomFields) -> Images:
     """The shifts beside what these fields show of them; empty arrays where there are none."""
     values, variance, group = data.values()
     shown = group == IMAGES
-    values, predicted = (unshared(data, of[shown]) for of in (values, data.predicted(fields)))
+    values, predicted = (projected(data, of[shown]) for of in (values, data.predicted(fields)))
     variance = variance[shown].copy()
     doubt = 0.0
     for blocks, own in data.views():
@@ -69,7 +69,7 @@ def with_noise_seen(data: Observations, fields: RoomFields) -> Observations:
     return eqx.tree_at(lambda of: of.shifts, data, tuple(scaled))
 
 
-def unshared(data: Observations, shifts_px: Float[np.ndarray, " shifts"]) -> Float[np.ndarray, " shifts"]:
+def projected(data: Observations, shifts_px: Float[np.ndarray, " shifts"]) -> Float[np.ndarray, " shifts"]:
     """Shifts of all views without the errors that windows share, fitted to them at any size."""
     rest = shifts_px.copy()
     for blocks, own in data.views():

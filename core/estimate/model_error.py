@@ -28,7 +28,7 @@ from scipy.optimize import minimize_scalar
 
 from core.data_error import LENGTH_SHARE
 from core.estimate.forward_runs import Derivatives
-from core.estimate.image_noise import images, unshared
+from core.estimate.image_noise import images, projected
 from core.estimate.least_squares import Posterior
 from core.estimate.observation import IMAGES, Observations
 from core.room.vertices import RoomFields
@@ -115,7 +115,7 @@ def model_error(
     seen = images(data, found)
     apart = np.stack([s - jacobian @ m for s, m in zip(between, moved, strict=True)])
     shown = data.values()[2] == IMAGES
-    apart = np.stack([unshared(data, of[shown]) for of in apart[:models]])
+    apart = np.stack([projected(data, of[shown]) for of in apart[:models]])
     left, noise = seen.left_px, seen.variance_px2
     size = np.ones(len(pairs))
     size[:models] = size_of(left, noise, apart, data.alike()[shown])

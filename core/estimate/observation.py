@@ -28,8 +28,8 @@ from core.scene import Outlet, Scene
 from core.view_frame import facing
 
 _BLOCKS_ACROSS = 28
-# Kinds of data in `Observations.values`. Neighbours of the first two have correlated errors; 3 are sensors of u.
-IMAGES, PLANES, SENSORS, OUTLETS = 0, 1, 2, 4
+# Kinds of data in `Observations.values`; neighbours of the first two have correlated errors.
+IMAGES, PLANES, SENSORS, SPEEDS, OUTLETS = range(5)
 
 
 class ShiftBlocks(eqx.Module):
@@ -136,18 +136,21 @@ class Observations(eqx.Module):
     def values(
         self,
     ) -> tuple[Float[np.ndarray, " data"], Float[np.ndarray, " data"], Int[np.ndarray, " data"]]:
-        """Data, noise variances, and kinds (0 shifts, 1 planes, 2 sensors' T, 3 sensors' u, 4 outlets)."""
-        parts = [(b.displacement_px.ravel(), b.variance_px2.ravel(), 0) for b in self.shifts]
+        """Data, noise variances, and kinds: shifts, planes, sensors' T and u, outlets."""
+        parts = [(b.displacement_px.ravel(), b.variance_px2.ravel(), IMAGES) for b in self.shifts]
         ambient = self.scene.air.ambient_temperature_k
         parts += [
-            (_plane_pool(p, p.temperature_k - ambient, self.scene), PLANE_NOISE_K**2, 1) for p in self.planes
+            (_plane_pool(p, p.temperature_k - ambient, self.scene), PLANE_NOISE_K**2, PLANES)
+            for p in self.planes
         ]
         for s in self.sensors:
             t, u = np.isfinite(s.temperature_k), np.isfinite(s.velocity_m_s)
             std = np.broadcast_to(s.velocity_std_m_s[:, None], u.shape)
-            parts.append((s.temperature_k[t] - ambient, s.temperature_std_k[t] ** 2, 2))
-            parts.append((s.velocity_m_s[u], std[u] ** 2, 3))
-        parts += [(np.array([k - ambient]), outlet.temperature_std_k**2, 4) for _, outlet, k in self.outlets]
+            parts.append((s.temperature_k[t] - ambient, s.temperature_std_k[t] ** 2, SENSORS))
+            parts.append((s.velocity_m_s[u], std[u] ** 2, SPEEDS))
+        parts += [
+            (np.array([k - ambient]), outlet.temperature_std_k**2, OUTLETS) for _, outlet, k in self.outlets
+        ]
         values = np.concatenate([np.asarray(v, float).ravel() for v, _, _ in parts] or [np.zeros(0)])
         variance = np.concatenate(
             [np.broadcast_to(s, np.shape(v)).ravel() for v, s, _ in parts] or [np.zeros(0)]
