@@ -15,7 +15,8 @@ COLUMNS, LINES = 56, 14
 
 def sketch(solution: Solution, columns: int = COLUMNS, lines: int = LINES) -> Text:
     """The temperature on the middle plane, x to the right and z upwards; two rows of it in each line."""
-    middle = solution.temperature_k[:, solution.temperature_k.shape[1] // 2]
+    temperature_k = solution.filled().temperature_k
+    middle = temperature_k[:, temperature_k.shape[1] // 2]
     across = np.linspace(0, middle.shape[0] - 1, columns).round().astype(int)
     up = np.linspace(middle.shape[1] - 1, 0, 2 * lines).round().astype(int)
     plane = middle[np.ix_(across, up)].T

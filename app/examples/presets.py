@@ -44,7 +44,7 @@ def _row(preset: str, done: Reconstruction) -> Row:
     return Row(
         preset,
         done.solution.solver_s,
-        None if std is None else float(np.mean(std)),
+        None if std is None else float(np.nanmean(std)),
         scores["T"]["rms_K"] if scores else None,
         velocity["rel"] if velocity else None,
     )

@@ -126,10 +126,10 @@ def _sure(finding: Finding) -> str:
     solution = finding.solution
     parts = []
     if solution.temperature_std_k is not None:
-        parts.append(f"temperature to ± {EITHER_WAY * float(np.median(solution.temperature_std_k)):.2f} K")
+        parts.append(f"temperature to ± {EITHER_WAY * float(np.nanmedian(solution.temperature_std_k)):.2f} K")
     if solution.velocity_std_m_s is not None:
         spread = np.linalg.norm(np.asarray(solution.velocity_std_m_s), axis=-1)
-        parts.append(f"velocity to ± {EITHER_WAY * float(np.median(spread)):.2f} m/s")
+        parts.append(f"velocity to ± {EITHER_WAY * float(np.nanmedian(spread)):.2f} m/s")
     sure = (
         f"At a usual place these are known: {' and '.join(parts)} (95 %)."
         if parts

@@ -20,7 +20,10 @@ _BEFORE_M, _BEFORE_SHARE = 1.0, 0.3
 
 @dataclass(frozen=True)
 class Place:
-    """A place with its words: temperature [C] and speed [m/s], half of each 95 % interval, and the truth."""
+    """A place with its words: temperature [C] and speed [m/s], half of each 95 % interval, and the truth.
+
+    None is what is not known there, or where an object stands.
+    """
 
     words: str
     at_m: Vector3
@@ -118,10 +121,12 @@ def _where(scene: Scene) -> list[tuple[str, Vector3]]:
     return chosen
 
 
-def _at(solution: Solution, field: np.ndarray, at_m: Vector3) -> float:
+def _at(solution: Solution, field: np.ndarray, at_m: Vector3) -> float | None:
+    """The field there, linear between vertices; None in and on an object, which holds no air."""
     axes = (solution.x_m, solution.y_m, solution.z_m)
     inside = [np.clip(x, axis[0], axis[-1]) for x, axis in zip(at_m, axes, strict=True)]
-    return float(RegularGridInterpolator(axes, np.asarray(field, np.float64))(inside)[0])
+    value = float(RegularGridInterpolator(axes, np.asarray(field, np.float64))(inside)[0])
+    return None if np.isnan(value) else value
 
 
 def _told(value: float | None, half: float | None, unit: str, digits: int) -> str:

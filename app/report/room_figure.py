@@ -130,7 +130,7 @@ def _plane(axis, solution: Solution, order: int):
     x, z = np.meshgrid(solution.x_m, solution.z_m, indexing="ij")
     place = paper(np.stack([x, np.full_like(x, solution.y_m[middle]), z], axis=-1))
     # The walls' own temperatures are not the air's.
-    low, high = np.percentile(celsius[1:-1, 1:-1], [1, 99])
+    low, high = np.nanpercentile(celsius[1:-1, 1:-1], [1, 99])
     return axis.pcolormesh(
         place[..., 0], place[..., 1], celsius, cmap=AIR, vmin=low, vmax=high, shading="gouraud",
         zorder=order,

@@ -15,8 +15,10 @@ from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.experiment.shift_files import write_shifts
 from app.files.provenance import provenance
 from app.files.toml import to_plain
+from app.report.answer import summary
 from app.report.finding import Finding, read_finding
 from app.report.page import render_report, write_report
+from app.report.pdf import write_pdf
 from calibration.record import Record, SeenBoard, record_to_json
 from core.geometry import Box, looking_along_y
 from core.objects import RoomObject
@@ -76,6 +78,23 @@ def test_a_report_from_memory_is_the_report_from_the_disk(kept):
     assert "There is no truth" in page
     for entry in kept.manifest["inputs"].values():
         assert entry["sha256"] in page
+
+
+def test_an_object_leaves_the_air_around_it_its_numbers(kept):
+    table = RoomObject(name="table", lower_m=(-0.7, -0.7, -1.0), upper_m=(-0.3, -0.3, 0.2))
+    still = np.zeros((5, 5, 5, 3), np.float32)
+    solution = replace(
+        kept.solution,
+        temperature_std_k=np.full((5, 5, 5), 0.1),
+        velocity_m_s=still + 0.1,
+        velocity_std_m_s=still + 0.01,
+    )
+    finding = replace(kept, solution=solution.without_objects((table,)))
+    assert "temperature to ± 0.20 K and velocity to ± 0.03 m/s (95 %)" in " ".join(summary(finding))
+    page = render_report(finding)
+    assert missing(page) == []
+    assert "nan" not in re.sub(r"base64,[^\"]*", "", page)
+    write_pdf(finding, kept.experiment.folder / "report.pdf")
 
 
 def test_a_guide_left_half_way_costs_the_report_nothing(kept):

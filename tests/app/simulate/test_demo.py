@@ -10,6 +10,7 @@ from app.simulate.demo import WORLD, run_demo
 from app.simulate.worlds import LAB
 from app.volume.sample import SAMPLE_ROOM
 from core.significance import EITHER_WAY
+from core.objects import RoomObject
 from tests.app.report.test_indoor import OPENINGS, PLUG_ROOM, layered, replace
 
 
@@ -39,6 +40,15 @@ def test_places_have_their_values_and_intervals():
     assert middle.speed_half_m_s == pytest.approx(EITHER_WAY * 0.01)
     assert rows(found)[1][1] == "23.85 ± 0.10 °C"
     assert rows(found)[1][2] == "-"
+
+
+def test_a_place_in_an_object_has_no_air_to_tell_of():
+    table = RoomObject(name="table", lower_m=(1.5, 1.0, 0.5), upper_m=(2.5, 2.0, 1.5))
+    solution = layered(deviation=0.01).without_objects((table,))
+    told = rows(places(solution, replace(PLUG_ROOM, boundary=OPENINGS)))
+    assert told[1][1:] == ("-", "-", "-", "-")
+    assert told[2][1].endswith("°C")
+    assert "nan" not in sketch(solution).plain
 
 
 def test_the_sketch_is_warm_above_and_cold_below():
