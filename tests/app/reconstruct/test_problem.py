@@ -8,11 +8,14 @@ import pytest
 from app.errors import BadInputError
 from app.experiment.captures import newest_pair, write_capture
 from app.experiment.folder import ExperimentSettings, create_experiment
+from app.files.durable import write_text
 from app.reconstruct.measure import measure
 from app.reconstruct.presets import PRESETS, STANDARD, check_data_term, sized
 from app.reconstruct.problem import known_of, problem_of
+from app.report.answer import checks
+from calibration.bundle import given_bundle, to_json
 from core.geometry import Box, looking_along_y
-from core.scene import FixedTexture, Inlet, Outlet, Patch, Scene, SolveModel, View
+from core.scene import FixedTexture, Inlet, Outlet, Patch, ProjectedPattern, Scene, SolveModel, View
 from core.setting import SettingError
 from core.solve.nondimensional import frame_of
 from core.solve.regime import DataModel, image_loss
@@ -102,3 +105,28 @@ def test_a_stated_grid_sizes_the_room():
     assert sized(STANDARD, scene) == STANDARD
     stated = sized(STANDARD, replace(scene, solve=SolveModel(grid=12)))
     assert (stated.cells, stated.coarse_cells) == (12, 8)
+
+
+def test_a_camera_whose_wall_is_not_calibrated_has_its_lens_and_stands_where_the_scene_says(tmp_path):
+    projector = replace(CAMERA, position_m=(0.5, -3.0, 0.0))
+    scene = Scene(
+        room=ROOM, views=(View(camera=CAMERA),), light=ProjectedPattern(projector=projector), boundary=(INLET,)
+    )
+    experiment = create_experiment(tmp_path / "one", ExperimentSettings(scene=scene))
+    # As the steps camera and projector leave them: in the camera's own frame.
+    own = replace(CAMERA, focal_px=(210.0, 210.0), position_m=(0.0, 0.0, 0.0), rotation_rad=(0.0, 0.0, 0.0))
+    lamp = replace(own, position_m=(0.4, 0.0, 0.0))
+
+    def known(wall_m):
+        date = "2026-03-01T12:00:00+00:00"
+        made = given_bundle(date=date, cameras={"camera": own}, projector=lamp, back_wall_y_m=wall_m)
+        write_text(experiment.bundle_path, to_json(made))
+        return known_of(experiment)
+
+    afar, placed = known(None), known(1.0)
+
+    assert afar.scene.views[0].camera == replace(CAMERA, focal_px=own.focal_px)
+    assert afar.scene.light.projector == replace(projector, focal_px=own.focal_px)
+    assert checks([afar.optics]) == (afar.optics,)
+    assert (placed.scene.views[0].camera, placed.scene.light.projector) == (own, lamp)
+    assert checks([placed.optics]) == ()
