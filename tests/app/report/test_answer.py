@@ -2,11 +2,14 @@
 
 import pytest
 
+from app.experiment.captures import newest_pair
+from app.reconstruct.agreement import rendered_agreement
 from app.report.answer import checks, doubts, ventilates
 from app.report.indoor import Quantity
 from core.estimate.diagnostics import doubtful, missing_heat, other_way, suspicion
 from core.room.boundary_conditions import SuspectedHeater
 from core.scene import Patch
+from tests.app.reconstruct.test_problem import captured
 from tests.core.estimate.test_temperature_levels import problem
 
 FLOOR = Patch(wall="z_min", lower_m=(0.8, 0.8), upper_m=(1.2, 1.2))
@@ -31,6 +34,12 @@ def test_a_room_is_compared_with_a_mixed_one_only_where_its_interval_says_so(val
 def test_what_bids_distrust_is_picked_from_all_that_a_result_says_the_most_telling_first():
     said = (*doubtful(0.2), *doubtful(0.7), *other_way(0.1), *other_way(-0.8), "No still border was found.")
     assert doubts(said) == (*other_way(-0.8), *doubtful(0.7))
+
+
+def test_a_pattern_that_is_not_the_scenes_is_told_before_the_answer(tmp_path):
+    experiment = captured(tmp_path / "one", "displacement")
+    mirrored = rendered_agreement(experiment.settings.scene, newest_pair(experiment).reference)
+    assert doubts(["nothing", mirrored]) == (mirrored,)
 
 
 def test_what_is_to_be_looked_at_comes_from_what_the_fit_says_heat_before_entries():
