@@ -63,8 +63,11 @@ def parse(data: dict[str, Any], kind: type[T], source: str, text: str = "") -> T
 
 
 def to_toml(value: Any) -> str:
-    """TOML text that `read_toml` reads back to an equal value."""
-    return tomlkit.dumps(_without_none(to_plain(value)))
+    """TOML text that `read_toml` reads back to an equal value.
+
+    Nothing and empty arrays are not written: an array's tables can be added below it only where it is not there yet.
+    """
+    return tomlkit.dumps(_written(to_plain(value)))
 
 
 def to_plain(value: Any) -> Any:
@@ -83,11 +86,11 @@ def _made(kind: type[T]) -> TypeAdapter[T]:
     return TypeAdapter(kind)
 
 
-def _without_none(value: Any) -> Any:
+def _written(value: Any) -> Any:
     if isinstance(value, dict):
-        return {k: _without_none(v) for k, v in value.items() if v is not None}
+        return {k: _written(v) for k, v in value.items() if v is not None and v != []}
     if isinstance(value, list):
-        return [_without_none(v) for v in value]
+        return [_written(v) for v in value]
     return value
 
 
@@ -95,4 +98,9 @@ def _no_toml(error: str, source: str) -> str:
     found = re.search(r" \(at line (\d+), column (\d+)\)", error)
     where = at_place(source, (int(found[1]), int(found[2])) if found else None)
     said = error.replace(found[0], "") if found else error
-    return f"{where}: it is not valid TOML ({said}). Correct the file at that place."
+    twice = re.search(r"immutable namespace \((.*)\)", said)
+    todo = "Correct the file at that place."
+    if twice:
+        key = re.findall(r"'([^']*)'", twice[1])[-1]
+        todo = f"{key!r} is given twice: delete the line {key} = [], or what stands in its place, and keep the tables."
+    return f"{where}: it is not valid TOML ({said}). {todo}"

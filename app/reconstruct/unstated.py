@@ -51,8 +51,8 @@ def told(scene: Scene, found: Found, on_floor: bool) -> Found:
         f"{'xyz'[across]} {x0:.2f} to {x1:.2f} m, z {z0:.2f} to {z1:.2f} m as seen on it. "
         f"{_place(found, on_floor)} it is {box.size_m[across]:.2f} m "
         f"wide and {box.size_m[2]:.2f} m high; how deep it is cannot be seen. {_SHADOW if shaded else ''}"
-        f"{_use(solved)} State it in experiment.toml: {' '.join(found.entry.split())}; and the heat that it gives, "
-        f'if any (a person: thermal = "power", power_w = 75).{refused}'
+        f"{_use(solved)}{refused} State it at the end of experiment.toml, with the heat that it gives, if any (a "
+        f'person: thermal = "power", power_w = 75):\n{found.entry.rstrip()}'
     )
     return replace(found, solved=solved, sentence=sentence)
 

@@ -4,7 +4,7 @@ import pytest
 
 from app.errors import BadInputError
 from app.experiment.folder import ExperimentSettings
-from app.files.toml import adapter_of, parse, read_toml, to_plain, to_toml
+from app.files.toml import adapter_of, from_toml, parse, read_toml, to_plain, to_toml
 from core.geometry import Box, looking_along_y
 from core.scene import FixedTexture, Inlet, Outlet, Patch, ProjectedPattern, Scene, View, Wall
 
@@ -32,6 +32,13 @@ def test_settings_survive_the_way_to_toml_and_back(tmp_path):
     path = tmp_path / "experiment.toml"
     path.write_text(to_toml(settings), encoding="utf-8")
     assert read_toml(path, ExperimentSettings) == settings
+
+
+def test_a_table_beside_an_empty_array_of_its_name_says_which_line_is_in_the_way():
+    text = 'schema_version = 1\n[scene]\nobjects = []\n[[scene.objects]]\nname = "desk"\n'
+    with pytest.raises(BadInputError, match=r"line 4, column 16: .*delete the line objects = \[\]"):
+        from_toml(text, ExperimentSettings, "experiment.toml")
+    assert "objects" not in to_toml(example())
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.experiment.folder import ExperimentSettings
 from app.experiment.found import found_in
-from app.files.toml import to_plain
+from app.files.toml import from_toml, to_plain, to_toml
 from app.reconstruct.cover import covered_windows
 from app.reconstruct.found import found_things, what_stands
 from app.rig.nuisances import spoiled
@@ -180,6 +181,10 @@ def test_what_is_proposed_can_be_stated_and_is_then_found_no_more():
     picture = seen(room(), (PERSON,))
     _, (one,) = found(room(), picture)
     (entry,) = tomllib.loads(one.entry)["scene"]["objects"]
+    # As it is told: its last lines can be pasted below what airlens wrote.
+    _, _, lines = one.sentence.partition("\n")
+    written = to_toml(ExperimentSettings(scene=room()))
+    assert from_toml(f"{written}\n{lines}\n", ExperimentSettings, "experiment.toml").scene.objects == (one.box,)
     stated = RoomObject(name=entry["name"], lower_m=tuple(entry["lower_m"]), upper_m=tuple(entry["upper_m"]))
     assert stated == one.box
     assert found(room((stated,)), picture)[1] == ()
