@@ -15,11 +15,14 @@ from jaxtyping import Float, Float32
 
 from app.files.durable import durable_path
 from core.displacement import check_pair
+from core.setting import SettingError
 
 Image = Float32[np.ndarray, "rows cols"]
 
 _BORDER = 0.08
 _LEAST_TEXTURE = 1e-9
+# Of a picture's contrast, by the other's: below it shows noise, or a light that was off.
+_LEAST_CONTRAST = 0.05
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,7 @@ class ShiftField:
 def shift_field(reference: Image, flow: Image, window_px: int = 21, remove_drift: bool = False) -> ShiftField:
     """Estimate the dense shift field. Raises SettingError for pictures that cannot be compared."""
     check_pair(reference, flow, window_px)
+    _check_contrast(reference, flow)
     low, high = np.percentile(reference, [0.1, 99.9])
     scale = 255.0 / max(float(high - low), 1e-6)
     a, b = (np.clip((image - low) * scale, 0, 255).astype(np.float32) for image in (reference, flow))
@@ -45,6 +49,22 @@ def shift_field(reference: Image, flow: Image, window_px: int = 21, remove_drift
         drift_px, everywhere = _border_drift(field, std)
         field = field - everywhere
     return ShiftField(field.astype(np.float32), std, drift_px)
+
+
+def _check_contrast(reference: Image, flow: Image) -> None:
+    """Raises SettingError where a picture shows no pattern."""
+    seen = {
+        name: float(np.ptp(np.percentile(image, [0.1, 99.9])))
+        for name, image in {"reference": reference, "flow": flow}.items()
+    }
+    most = max(seen.values())
+    for name, contrast in seen.items():
+        if contrast <= _LEAST_CONTRAST * most:
+            share = f"{100 * contrast / most:.2g} % of the other's" if most else "none at all"
+            raise SettingError(
+                f"The {name} picture shows no pattern: its contrast is {share}. Give two pictures of the same "
+                "pattern in the same light."
+            )
 
 
 def write_shift_field(path: Path, field: ShiftField, title: str) -> None:

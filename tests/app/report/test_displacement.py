@@ -78,3 +78,12 @@ def test_pictures_that_are_none_are_refused(tmp_path):
 def test_pictures_of_unequal_size_are_refused(dots):
     with pytest.raises(SettingError, match="equal sizes"):
         shift_field(dots, dots[:-1])
+
+
+def test_a_picture_without_a_pattern_is_named(dots):
+    black = np.zeros_like(dots)
+    noisy = black + np.random.default_rng(2).normal(0.0, 0.002, dots.shape).astype(np.float32)
+    for pair, name in (((dots, black), "flow"), ((noisy, dots), "reference"), ((black, black), "reference")):
+        with pytest.raises(SettingError, match=f"The {name} picture shows no pattern"):
+            shift_field(*pair)
+    shift_field(dots, 0.3 * dots)
