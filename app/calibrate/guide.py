@@ -148,12 +148,12 @@ class GuidedCalibration:
     def _check(self) -> None:
         step, plan = self._plan.step, self._plan
         check_own(self._calibration, plan.camera, step)
-        if step in (StepName.camera, StepName.projector) and plan.board is None:
+        record, other = self.record, self._calibration.started(plan.camera)
+        if plan.board is None and self._needs_board(record):
             raise BadInputError(
                 "The board is not known. State it under Board on the page, by --grid and --square, or as "
                 "a [rig.board] table in experiment.toml."
             )
-        record, other = self.record, self._calibration.started(plan.camera)
         if other not in (None, step) and step is not StepName.response:
             raise BadInputError(
                 f"The step '{other}' is started and not complete: take or skip what it still asks for, or "
@@ -166,6 +166,12 @@ class GuidedCalibration:
         lit = record is not None and record.panel_size_px is not None
         if step is StepName.wall and self._stage.display is not None and not lit:
             raise BadInputError("Gray code on the wall needs a calibrated projector; calibrate that first.")
+
+    def _needs_board(self, record: Record | None) -> bool:
+        """Whether the step can only be taken with a board; a wall is found by one where nothing shows Gray code."""
+        if self._plan.step is StepName.wall:
+            return self._stage.display is None and record is not None and record.level is None
+        return self._plan.step is not StepName.response
 
     def _tasks(self) -> list[StageTask]:
         return {

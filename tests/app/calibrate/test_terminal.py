@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +16,13 @@ from typer.testing import CliRunner
 from app.calibrate.folder import CalibrationFolder, StepName
 from app.calibrate.guide import GuidedCalibration, LivePlan
 from app.cli import create_cli
-from app.experiment.folder import ExperimentSettings, create_experiment
+from app.experiment.folder import ExperimentSettings, create_experiment, open_experiment, save_settings
 from app.experiment.rig_settings import BoardSettings, RigSettings, SimulatedCameraSettings
 from app.rig.stage import UnopenedStage
 from calibration.bundle import from_json
 from calibration.guide import PROJECTOR_PLAN
 from core.geometry import Box, Optics
-from core.scene import CameraNoise, ProjectedPattern, Scene, View
+from core.scene import CameraNoise, FixedTexture, ProjectedPattern, Scene, View
 from drivers.simulated import SimulatedDisplay
 from tests.calibration.practice import rig, turned
 
@@ -177,3 +178,18 @@ def test_steps_out_of_order_and_without_a_board_are_explained(tmp_path):
     assert "There is no" in str(
         run("camera", tmp_path / "none", "--grid", "9x6", "--square", "0.1").exception
     )
+
+
+def test_a_printed_wall_without_a_board_is_refused_and_found_by_one(tmp_path):
+    folder = tmp_path / "printed"
+    experiment(folder, 0.25)
+    settings = open_experiment(folder).settings
+    scene = replace(settings.scene, light=FixedTexture())
+    rig_settings = settings.rig.model_copy(update={"board": None})
+    save_settings(folder, settings.model_copy(update={"scene": scene, "rig": rig_settings}))
+    board = ("--grid", "9x6", "--square", "75mm")
+    assert run("camera", folder, *board).exit_code == 0
+    assert "The board is not known" in str(run("wall", folder).exception)
+    done = run("wall", folder, *board)
+    assert done.exit_code == 0, done.output
+    assert from_json((folder / "calibration" / "bundle.json").read_text()).wall is not None
