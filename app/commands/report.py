@@ -29,12 +29,13 @@ def report(
 def export(
     experiment: Annotated[Path, typer.Argument(help="Experiment folder.")],
     kind: Annotated[
-        Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf", "pvd"],
+        Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf", "pvd"] | None,
         typer.Option(
             "--format",
-            help="zip is an OpenFOAM case, ply a surface of one temperature, vtu paths of particles, pdf the report.",
+            help="By the output's name, or nc; zip is an OpenFOAM case, ply a surface of one temperature, vtu paths of "
+            "particles, pdf the report.",
         ),
-    ] = "nc",
+    ] = None,
     output: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,
     result: Result = None,
     level_k: Annotated[

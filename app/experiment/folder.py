@@ -120,6 +120,15 @@ class Experiment:
             )
         return found[-1]
 
+    def result(self, given: Path | None = None) -> Path:
+        """That result, or without one the newest. Raises BadInputError for a folder that is no result."""
+        if given is None:
+            return self.latest_result()
+        if not (given / "manifest.json").is_file():
+            there = ", ".join(str(folder) for folder in finished(self.results_folder)) or "none yet"
+            raise BadInputError(f"{given} is no result. Results of {self.folder}: {there}.")
+        return given
+
 
 def open_experiment(folder: Path) -> Experiment:
     """Read an experiment folder. Raises BadInputError."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from app.errors import BadInputError
 from app.experiment.folder import open_experiment, read_manifest
@@ -29,14 +29,19 @@ ExportFormat = Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pd
 
 def export(
     folder: Path,
-    kind: ExportFormat,
+    kind: ExportFormat | None = None,
     output: Path | None = None,
     result: Path | None = None,
     level_k: float | None = None,
 ) -> Path:
-    """Write the newest (or the given) result in another format and return the file. Raises BadInputError."""
+    """Write the newest (or the given) result in another format and return the file. Raises BadInputError.
+
+    Without a format it is the one that the output's name ends in; without either NetCDF.
+    """
     experiment = open_experiment(folder)
-    source = (result or experiment.latest_result()) / "result.nc"
+    source = experiment.result(result) / "result.nc"
+    if kind is None:
+        kind = _named_by(output)
     # A collection is several files, packed.
     ending = "zip" if kind == "pvd" else kind
     named: dict[str, str] = {"pvd": "result-bursts", "pdf": "report"}
@@ -66,6 +71,20 @@ def export(
         solution = read_result(source)
         write_durably(path, lambda temporary: writer(temporary, solution))
     return path
+
+
+def _named_by(output: Path | None) -> ExportFormat:
+    """The format that a file's name ends in. Raises BadInputError."""
+    if output is None:
+        return "nc"
+    ending = output.suffix.removeprefix(".")
+    found = next((one for one in get_args(ExportFormat) if one == ending), None)
+    if found is None:
+        raise BadInputError(
+            f"The output is {output.name}; expected a name that ends in one of "
+            f"{', '.join(get_args(ExportFormat))}, or a format."
+        )
+    return found
 
 
 def _write_csv(path: Path, solution: Solution, derived: Sequence[Derived] = ()) -> None:

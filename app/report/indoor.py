@@ -114,7 +114,7 @@ NO_VELOCITY = (
 def indoor_of(folder: Path, result: Path | None = None, asked: IndoorAsked = IndoorAsked()) -> Indoor:
     """The figures of an experiment's newest, or the given, result. Raises BadInputError, SettingError."""
     experiment = open_experiment(folder)
-    solution = read_result((result or experiment.latest_result()) / "result.nc")
+    solution = read_result(experiment.result(result) / "result.nc")
     return indoor(solution, experiment.settings.scene, asked)
 
 

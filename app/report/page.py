@@ -69,7 +69,7 @@ class Section:
 def report_again(folder: Path, result: Path | None = None) -> Path:
     """Write report.html into the newest (or the given) result of an experiment. Raises BadInputError."""
     experiment = open_experiment(folder)
-    result_folder = result or experiment.latest_result()
+    result_folder = experiment.result(result)
     return write_report(read_finding(experiment, result_folder), result_folder)
 
 

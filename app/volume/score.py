@@ -19,7 +19,7 @@ from core.significance import EITHER_WAY
 def score_experiment(folder: Path, truth_path: Path, result: Path | None = None) -> dict[str, Any]:
     """Score the newest (or the given) result of an experiment. Raises BadInputError."""
     experiment = open_experiment(folder)
-    result_folder = result or experiment.latest_result()
+    result_folder = experiment.result(result)
     solution = read_result(result_folder / "result.nc")
     scores = score_solution(solution, read_volume(truth_path))
     manifest = read_manifest(result_folder)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.errors import BadInputError
 from app.experiment.captures import newest_pair, write_capture
 from app.experiment.folder import ExperimentSettings, create_experiment, write_manifest
 from app.experiment.found import Found
@@ -16,8 +17,10 @@ from app.experiment.shift_files import write_shifts
 from app.files.provenance import provenance
 from app.files.toml import to_plain
 from app.report.answer import summary
+from app.report.export import export
 from app.report.finding import Finding, read_finding
-from app.report.page import render_report, write_report
+from app.report.indoor import indoor_of
+from app.report.page import render_report, report_again, write_report
 from app.report.pdf import write_pdf
 from calibration.record import Record, SeenBoard, record_to_json
 from core.geometry import Box, looking_along_y
@@ -95,6 +98,24 @@ def test_an_object_leaves_the_air_around_it_its_numbers(kept):
     assert missing(page) == []
     assert "nan" not in re.sub(r"base64,[^\"]*", "", page)
     write_pdf(finding, kept.experiment.folder / "report.pdf")
+
+
+def test_what_is_no_result_is_named_with_those_that_are(kept):
+    folder, results = kept.experiment.folder, kept.experiment.results_folder
+    for given in (results, folder / "nix"):
+        for use in (report_again, indoor_of, lambda at, result: export(at, "csv", None, result)):
+            with pytest.raises(BadInputError, match=rf"{given} is no result\. Results of .*: {results / 'one'}\."):
+                use(folder, given)
+
+
+def test_an_export_has_the_format_that_its_name_ends_in(kept):
+    folder = kept.experiment.folder
+    table = export(folder, output=folder / "air.csv")
+    assert table.read_text().startswith("x [m],y [m],z [m],T [K]")
+    assert export(folder).name == "result-export.nc"
+    for kind, name in ((None, "air.xls"), (None, "air"), ("nc", "air.csv")):
+        with pytest.raises(BadInputError, match="expected a name that ends in"):
+            export(folder, kind, folder / name)
 
 
 def test_a_guide_left_half_way_costs_the_report_nothing(kept):
