@@ -22,7 +22,9 @@ from app.experiment.plan import PLAN_FILE
 from app.experiment.printed import is_of_the_scene, read_printed
 from app.experiment.rig_settings import RealCameraSettings
 from app.experiment.views import printed_walls, view_names
+from app.reconstruct.problem import known_of, problem_of
 from core.scene import FixedTexture
+from core.setting import SettingError
 
 
 class Step(StrEnum):
@@ -69,6 +71,7 @@ def whereabouts(folder: Path, shown: str = "") -> Whereabouts:
     experiment = open_experiment(folder)
     has = {
         "rig": _rig(experiment),
+        "scene": _refused(experiment),
         "plan": "made" if (experiment.folder / PLAN_FILE).is_file() else "none yet",
         "print": _print(experiment),
         "calibration": _calibration(parts_of(experiment), experiment),
@@ -81,10 +84,11 @@ def whereabouts(folder: Path, shown: str = "") -> Whereabouts:
 
 
 def next_step(experiment: Experiment, shown: str, advised: bool = True) -> Next:
-    """The first step of the work that is not done; `advised` ones may be passed over.
+    """The first step of the work that is not done; `advised` ones may be passed over. Commands quote `shown`.
 
     Raises BadInputError for files that cannot be read.
     """
+    shown = shlex.quote(shown)
     rules = (
         _of_the_rig,
         _of_the_plan,
@@ -92,6 +96,7 @@ def next_step(experiment: Experiment, shown: str, advised: bool = True) -> Next:
         _of_the_calibration,
         _of_the_ties,
         _of_the_captures,
+        _of_the_scene,
         _of_the_results,
     )
     for rule in rules:
@@ -209,6 +214,23 @@ def _lacking(experiment: Experiment, role: str) -> tuple[Path, str] | None:
     return None
 
 
+def _of_the_scene(experiment: Experiment, shown: str) -> Next | None:
+    """A scene that is refused is mended before anything is computed of it."""
+    refused = _refused(experiment)
+    if not refused:
+        return None
+    return Next(Step.reconstruct, f"airlens reconstruct {shown}", f"mend experiment.toml first. It is {refused}")
+
+
+def _refused(experiment: Experiment) -> str:
+    """Why the scene cannot be reconstructed, whatever the pictures show; empty where it can."""
+    try:
+        problem_of(known_of(experiment), ())
+    except (BadInputError, SettingError) as error:
+        return f"refused: {error}".removesuffix(".")
+    return ""
+
+
 def _of_the_results(experiment: Experiment, shown: str) -> Next | None:
     command = f"airlens reconstruct {shown}"
     if experiment.checkpoint_folder.is_dir():
@@ -216,6 +238,8 @@ def _of_the_results(experiment: Experiment, shown: str) -> Next | None:
     results = finished(experiment.results_folder)
     if not results:
         return Next(Step.reconstruct, command, "both captures are there")
+    if not (results[-1] / "result.nc").is_file():
+        return Next(Step.reconstruct, command, f"the newest result, {results[-1].name}, has lost its result.nc")
     used = read_manifest(results[-1]).get("captures", {})
     newest = {role: experiment.latest_capture(role).name for role in ("reference", "flow")}
     if isinstance(used, dict) and any(used.get(role, name) != name for role, name in newest.items()):

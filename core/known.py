@@ -129,8 +129,9 @@ def refuse_outward(inlet: Inlet) -> None:
     """Raise SettingError if the supply does not point into the room."""
     face = face_of(inlet.patch.wall)
     if inlet.inward_m_s <= 0:
+        velocity = ", ".join(f"{part + 0.0:.3g}" for part in inlet.velocity_m_s)
         raise SettingError(
-            f"The inlet on {inlet.patch.wall} supplies air at {inlet.velocity_m_s} m/s, which does not "
+            f"The inlet on {inlet.patch.wall} supplies air at ({velocity}) m/s, which does not "
             f"enter the room. Give a velocity with {'xyz'[face.axis]} {'> 0' if face.inward > 0 else '< 0'}, "
             "or make the patch an outlet."
         )

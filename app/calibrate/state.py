@@ -76,7 +76,8 @@ def line_of(calibration: CalibrationFolder, record: Record | None, step: StepNam
     """One line for the terminal after a view."""
     state = state_of(calibration, record, step)
     fit = "" if state.rms_px is None else f", rms {state.rms_px:.3f} px"
-    return f"{len(state.views)} views, {100 * state.covered:.0f} % of the picture covered{fit}"
+    many = "1 view" if len(state.views) == 1 else f"{len(state.views)} views"
+    return f"{many}, {100 * state.covered:.0f} % of the picture covered{fit}"
 
 
 def _fit(model: Model | FurtherProjector | None, of_projector: bool) -> Intrinsics | None:

@@ -1,5 +1,7 @@
 """What of a view is calibrated with the view itself, where another view's camera takes its pictures."""
 
+import shlex
+
 from app.calibrate.folder import CalibrationFolder, StepName
 from app.errors import BadInputError
 
@@ -14,18 +16,15 @@ def check_own(calibration: CalibrationFolder, view: str, step: StepName) -> None
         return
     if step is StepName.projector and any(one.name == owner for one in calibration.bundle().cameras):
         return
+    folder = shlex.quote(calibration.experiment.name)
     if step is StepName.projector:
         raise BadInputError(
             f"The pictures of {view!r} are taken by the camera of {owner!r}, which is not calibrated yet. Calibrate "
-            f"it first: airlens calibrate camera {calibration.experiment.name} --view {_quoted(owner)}."
+            f"it first: airlens calibrate camera {folder} --view {shlex.quote(owner)}."
         )
     raise BadInputError(
         f"The pictures of {view!r} are taken by the camera of {owner!r}, whose step '{step}' serves both. Calibrate "
-        f"{owner!r}: airlens calibrate {step} {calibration.experiment.name} --view {_quoted(owner)}. Of {view!r} "
-        f"itself there is its projector: airlens calibrate projector {calibration.experiment.name} --view "
-        f"{_quoted(view)}."
+        f"{owner!r}: airlens calibrate {step} {folder} --view {shlex.quote(owner)}. Of {view!r} "
+        f"itself there is its projector: airlens calibrate projector {folder} --view "
+        f"{shlex.quote(view)}."
     )
-
-
-def _quoted(name: str) -> str:
-    return f'"{name}"' if " " in name else name

@@ -1,5 +1,6 @@
 """`airlens demo`."""
 
+import shlex
 import time
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -102,8 +103,8 @@ def _tell(console: Console, story: "Story", folder: Path) -> None:
     )
     console.print(f"\nReport: {story.report}", soft_wrap=True)
     if folder.parent.name == "experiments":
-        data = "" if folder == FOLDER else f" {folder.parent.parent}"
+        data = "" if folder == FOLDER else f" {shlex.quote(str(folder.parent.parent))}"
         console.print(
             f"See it move: airlens serve{data}, and open the address that it prints.", soft_wrap=True
         )
-    console.print(f"Go on with it: airlens reconstruct {folder} --preset reference", soft_wrap=True)
+    console.print(f"Go on with it: airlens reconstruct {shlex.quote(str(folder))} --preset reference", soft_wrap=True)

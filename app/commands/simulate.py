@@ -1,5 +1,6 @@
 """`airlens simulate`."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -132,7 +133,9 @@ def simulate(
             bracketed=bracketed,
             snapshots_path=snapshots,
         )
-    typer.echo(f"{experiment}: reference and flow captured. Next: airlens reconstruct {experiment}")
+    typer.echo(
+        f"{experiment}: reference and flow captured. Next: airlens reconstruct {shlex.quote(str(experiment))}"
+    )
 
 
 def parse_baseline(text: str) -> "tuple[float, float]":

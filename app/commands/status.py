@@ -1,5 +1,6 @@
 """`airlens status`, and `airlens` alone: where you are, and what comes next."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -69,9 +70,9 @@ def show_all(folder: Path, as_json: bool = False) -> None:
         keys = ("experiment", "title", "next")
         typer.echo(json.dumps([dict(zip(keys, map(str, row), strict=True)) for row in rows], indent=1))
         return
-    typer.echo(f"{len(rows)} experiments in {folder.resolve()}")
+    typer.echo(f"{len(rows)} experiment{'s' if len(rows) != 1 else ''} in {folder.resolve()}")
     for path, title, following in rows:
         typer.echo(f"  {path}  {title}\n    next: {following}")
     data = folder if (folder / "experiments").is_dir() else None
     if data is not None:
-        typer.echo(f"The operator's page shows them: airlens serve {data}")
+        typer.echo(f"The operator's page shows them: airlens serve {shlex.quote(str(data))}")

@@ -16,6 +16,7 @@ A folder without a manifest is an interrupted one: listed as such, never used as
 
 import errno
 import hashlib
+import shlex
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -108,7 +109,7 @@ class Experiment:
             if read_manifest(folder).get("role") == role:
                 return folder
         raise BadInputError(
-            f"{self.folder} has no finished {role} capture. Take one: airlens capture {role} {self.folder}"
+            f"{self.folder} has no finished {role} capture. Take one: airlens capture {role} {self._quoted}"
         )
 
     def latest_result(self) -> Path:
@@ -116,9 +117,14 @@ class Experiment:
         found = finished(self.results_folder)
         if not found:
             raise BadInputError(
-                f"{self.folder} has no finished result. Make one: airlens reconstruct {self.folder}"
+                f"{self.folder} has no finished result. Make one: airlens reconstruct {self._quoted}"
             )
         return found[-1]
+
+    @property
+    def _quoted(self) -> str:
+        """The folder as a shell takes it."""
+        return shlex.quote(str(self.folder))
 
     def result(self, given: Path | None = None) -> Path:
         """That result, or without one the newest. Raises BadInputError for a folder that is no result."""

@@ -242,7 +242,7 @@ def _check_captures(reference: Capture, flow: Capture, scene: Scene) -> None:
     for capture in (reference, flow):
         if len(capture.images) != len(scene.views):
             raise BadInputError(
-                f"{capture.folder} holds {len(capture.images)} views; the scene has {len(scene.views)}. "
+                f"{capture.folder} does not fit the scene: views pictured {len(capture.images)}, stated {len(scene.views)}. "
                 "Capture again with this scene."
             )
         for image, view in zip(capture.images, scene.views, strict=True):

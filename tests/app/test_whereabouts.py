@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from dataclasses import replace
@@ -19,6 +20,7 @@ from app.experiment.rig_settings import (
 )
 from app.sheets.pattern import print_pattern
 from app.whereabouts import Step, next_step, whereabouts
+from core.scene import Inlet, PointSensors, Wall
 from tests.app.files.test_toml import example
 from tests.app.sheets.test_pattern import experiment as printable
 from tests.app.test_imports import HEAVY
@@ -47,6 +49,8 @@ def calibrated(monkeypatch, missing=()):
 
 def test_each_step_that_is_done_leads_to_the_next_one(tmp_path, monkeypatch):
     made = printable(tmp_path / "wall")
+    scene = replace(made.settings.scene, boundary=(Wall(wall="z_min"),))
+    made = save_settings(made.folder, made.settings.model_copy(update={"scene": scene}))
     folder = made.folder
     assert following(folder) == "airlens devices --full"
     made = with_rig(made, camera=CAMERA)
@@ -67,6 +71,8 @@ def test_each_step_that_is_done_leads_to_the_next_one(tmp_path, monkeypatch):
     assert following(folder) == "airlens reconstruct EXP"
     used = {"reference": "20260101T000000-reference", "flow": "20260101T000001-flow"}
     result = finish(folder / "results" / "20260101T000002-draft", captures=used)
+    assert "lost its result.nc" in whereabouts(folder, "EXP").next.reason
+    (result / "result.nc").write_text("")
     assert following(folder) == "airlens report EXP"
     (result / "report.html").write_text("")
     assert following(folder) == "airlens export EXP"
@@ -79,6 +85,39 @@ def test_each_step_that_is_done_leads_to_the_next_one(tmp_path, monkeypatch):
     assert "newer captures" in found.next.reason
     assert found.has["captures"] == "1 reference, 2 flow"
     assert "20260101T000002-draft" in found.has["results"]
+
+
+def test_a_scene_that_is_refused_is_told_before_it_is_reconstructed(tmp_path, monkeypatch):
+    made = create_experiment(tmp_path / "room", example(rig=RigSettings(camera=SimulatedCameraSettings())))
+    folder, scene = made.folder, made.settings.scene
+    assert "scene" not in whereabouts(folder).has
+    (folder / "plan.json").write_text("{}")
+    calibrated(monkeypatch)
+    for role in ("reference", "flow"):
+        finish(folder / "captures" / f"20260101T000000-{role}", role=role)
+    inlet = next(one for one in scene.boundary if isinstance(one, Inlet))
+    outwards = replace(inlet, velocity_m_s=tuple(-v for v in inlet.velocity_m_s))
+    for boundary, words in (
+        ((outwards,), "at (-0.5, 0, 0) m/s, which does not enter"),
+        ((inlet, inlet), "overlap"),
+        ((inlet, PointSensors(file="boundary/none.csv")), "none.csv"),
+    ):
+        wrong = replace(scene, boundary=boundary)
+        save_settings(folder, made.settings.model_copy(update={"scene": wrong}))
+        found = whereabouts(folder)
+        assert words in found.has["scene"]
+        assert words in found.next.reason
+        assert found.next.step is Step.reconstruct
+
+
+def test_a_command_can_be_pasted_where_the_folder_has_a_space(tmp_path):
+    folder = tmp_path / "Mein Buero" / "exp 1"
+    create_experiment(folder, example(rig=RigSettings(camera=SimulatedCameraSettings())))
+    command = whereabouts(folder).next.command
+    assert shlex.split(command) == ["airlens", "plan", str(folder)]
+    said = alone("status", folder.parent)
+    assert command in said
+    assert said.startswith("1 experiment in ")
 
 
 def test_a_pattern_that_is_no_longer_the_scenes_is_printed_again(tmp_path):
