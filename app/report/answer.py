@@ -58,8 +58,8 @@ def _people(finding: Finding) -> str:
     vote, doubting, draught = figures["pmv"], figures["ppd"], figures["draught_rate_p95"]
     return (
         f"{warm} and moves at {_value(figures['speed_mean'], 'm/s')}: people find it {warmth(vote.value)} "
-        f"({line_of(doubting)[1]} are dissatisfied), and where draught is worst it bothers "
-        f"{_value(draught, '% of them')}, {category(draught)} of ISO 7730."
+        f"({line_of(doubting)[1]} are dissatisfied), {category(vote)} of ISO 7730 for warmth, and where draught is "
+        f"worst it bothers {_value(draught, '% of them')}, {category(draught)} for draught."
     )
 
 

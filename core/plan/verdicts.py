@@ -74,7 +74,7 @@ def _verdict(scene: Scene, view: int, flow: ExpectedFlow, found: Signal, other_p
     if found.snr >= VISIBLE:
         return f"{seen}. Differences down to {found.smallest_visible_k:.2g} K stand out in one window."
     return (
-        f"{seen}. This rig cannot see {found.contrast_k:.2g} K in one window: it would need "
+        f"{seen}; {VISIBLE:g} times are needed. This rig cannot see {found.contrast_k:.2g} K in one window: it would need "
         f"{' or '.join(_remedies(scene, view, flow, found, other_p99_px))}."
     )
 
@@ -155,7 +155,7 @@ def moving(air: Fluctuation | None) -> list[str]:
     )
     stays_s = float(f"{air.time_s:.1g}")
     return [
-        f"The air moves: T departs from its mean by {air.std_k:.2g} K (rms), for some {stays_s:g} s at a time. "
+        f"The air moves: T fluctuates in time by {air.std_k:.2g} K (rms), for some {stays_s:g} s at a time. "
         f"How long to average (capture flow --bursts, --every-s) to know the mean {wished}."
     ]
 

@@ -1,15 +1,23 @@
 """What the report's answer claims, and what it leaves open."""
 
+import re
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 
 from app.experiment.captures import newest_pair
+from app.experiment.folder import Experiment, ExperimentSettings
+from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.reconstruct.agreement import rendered_agreement
-from app.report.answer import checks, doubts, ventilates
+from app.report.answer import checks, doubts, summary, ventilates
+from app.report.finding import Finding
 from app.report.indoor import Quantity
 from core.estimate.diagnostics import doubtful, missing_heat, other_way, suspicion
 from core.room.boundary_conditions import SuspectedHeater
 from core.scene import Patch
 from tests.app.reconstruct.test_problem import captured
+from tests.app.report.test_indoor import OPENINGS, PLUG_ROOM, layered
 from tests.core.estimate.test_temperature_levels import problem
 
 FLOOR = Patch(wall="z_min", lower_m=(0.8, 0.8), upper_m=(1.2, 1.2))
@@ -34,6 +42,17 @@ def test_a_room_is_compared_with_a_mixed_one_only_where_its_interval_says_so(val
 def test_what_bids_distrust_is_picked_from_all_that_a_result_says_the_most_telling_first():
     said = (*doubtful(0.2), *doubtful(0.7), *other_way(0.1), *other_way(-0.8), "No still border was found.")
     assert doubts(said) == (*other_way(-0.8), *doubtful(0.7))
+
+
+def test_each_category_says_of_what_it_is():
+    scene = replace(PLUG_ROOM, boundary=OPENINGS)
+    solution = layered(deviation=0.01)
+    settings = ExperimentSettings(rig=RigSettings(camera=SimulatedCameraSettings()), scene=scene)
+    experiment = Experiment(Path("nowhere"), settings)
+    found = Finding(experiment, "one", {}, solution, tuple, lambda: pytest.fail("it needs no pictures"))
+    people = summary(found)[0]
+    assert re.search(r"people find it .* are dissatisfied\), .*(category|worse).* of ISO 7730 for warmth, and", people)
+    assert people.endswith("category A to B for draught.")
 
 
 def test_a_pattern_that_is_not_the_scenes_is_told_before_the_answer(tmp_path):

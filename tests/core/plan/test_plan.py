@@ -85,6 +85,7 @@ def test_frames_that_are_asked_for_suffice():
     assert found.snr < 3
     sentence = verdict(scene, 0, flow, found, 0.0)
     assert "cannot see" in sentence
+    assert "3 times are needed" in sentence
     frames = int(sentence.split("need ")[1].split(" frames")[0])
     enough = replace(scene, views=(replace(scene.views[0], frames=frames),))
     assert planned(enough, 0.5)[2].snr == pytest.approx(3.0, rel=0.1)
