@@ -76,7 +76,9 @@ def clock_of(camera: Camera) -> Clock:
 
 
 def air_of(role: CaptureRole) -> AirState:
-    """What the air of a simulated room does during a capture of that role."""
+    """What the air of a simulated room does during a capture of that role; for dark frames the lens is covered."""
+    if role == "dark":
+        return "covered"
     return "moving" if role == "flow" else "still"
 
 

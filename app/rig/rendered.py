@@ -31,7 +31,8 @@ VIEWS_APART = 7919
 # Rows drawn at a time; what a shadow leaves of the light; periods of what is seen on an object, along x, y, z.
 _ROWS, _UNLIT, _FOLDS_M = 256, 0.02, np.array([0.31, 0.97, 0.23])
 
-AirState = Literal["still", "moving"]
+# What a simulated camera has before it: air that does one or the other, or a cover on its lens.
+AirState = Literal["still", "moving", "covered"]
 Picture = Float32[np.ndarray, "rows cols"]
 Picture1 = Float32[np.ndarray, " pixels"]
 
@@ -40,6 +41,9 @@ def seen_picture(
     experiment: Experiment, settings: SimulatedCameraSettings, air: AirState, view: int, steps: int
 ) -> Picture:
     """The luminance of every pixel after so many steps of the mount; 1 fills the well. Raises BadInputError."""
+    if air == "covered":
+        optics = experiment.settings.scene.views[view].camera
+        return np.zeros((optics.height_px, optics.width_px), np.float32)
     scene = _mounted(experiment, settings, view, steps)
     volume = read_volume(experiment.file(settings.room))
     field = None if air == "still" else volume_field(volume, scene)

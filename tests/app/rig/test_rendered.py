@@ -3,9 +3,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from app.experiment.folder import open_experiment
-from app.experiment.rig_settings import SimulatedCameraSettings
+from app.experiment.folder import ExperimentSettings, create_experiment, open_experiment
+from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.rig.beyond_wall import with_marks
+from app.rig.open import air_of, open_camera
 from app.rig.rendered import seen_picture, with_objects
 from app.simulate.experiment import simulate
 from app.volume.scene import RigOptions
@@ -13,6 +14,8 @@ from core.geometry import Box, looking_along_y
 from core.objects import RoomObject
 from core.rays.visibility import hidden_by_objects
 from core.scene import FixedTexture, Marks, Scene, View
+from drivers.burst import CapturePlan
+from drivers.capture import run_capture
 from tests.rooms import ROOM as VOLUME
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(4.0, 3.0, 3.0))
@@ -64,3 +67,12 @@ def test_beyond_the_wall_the_rooms_other_walls_move_with_the_air_and_a_frame_doe
     # What is seen of the side walls lies near the back wall, behind nearly as much air; its print is coarser.
     assert moved["room"][0] > 0.03
     assert moved["room"][1] > 0.05 * moved["room"][2] > 0.0
+
+
+def test_dark_frames_are_taken_with_the_lens_covered(tmp_path):
+    settings = ExperimentSettings(rig=RigSettings(camera=SimulatedCameraSettings()), scene=SCENE)
+    experiment = create_experiment(tmp_path / "one", settings)
+    with open_camera(experiment, air_of("dark")) as camera:
+        burst = run_capture(camera, CapturePlan(role="dark", frames=2))
+    assert [(one.name, one.good) for one in burst.verdicts] == [("dark level", True)]
+    assert burst.mean.std() > 0.0
