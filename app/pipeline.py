@@ -27,6 +27,7 @@ from app.reconstruct.problem import known_of, problem_of
 from app.reconstruct.sequence import check_sequence, with_departures
 from app.report.finding import Finding
 from app.report.page import write_report
+from app.volume.comparison import left_thermometers
 from core.problem import Problem
 from core.result import Solution
 from core.watch import Watch
@@ -109,6 +110,7 @@ def reconstruct(
     on_stage("keep the result", "report")
     stands = [one.sentence for one in measurement.found]
     told = [known.optics, *aged(experiment, captures), *measurement.notes, *stands, checked, *solution.notes]
+    told += left_thermometers(experiment, solution)
     result = into or _new_folder(experiment, preset)
     manifest = _manifest(experiment, preset, measurement, solution, told, time.perf_counter() - started)
     finding = Finding(

@@ -19,7 +19,7 @@ from core.significance import EITHER_WAY
 # A camera of fewer pixels, or a mean of fewer frames, sees less than a usual one.
 _PIXELS, _FRAMES = 2000, 100
 # Words of every sentence that bids distrust of a whole result. Swapped pictures explain the rest, so they come first.
-_DOUBTS = ("may be swapped", "does not match this capture", "distrust")
+_DOUBTS = ("may be swapped", "does not match this capture", "Check that thermometer", "distrust")
 # Words of every sentence that sends people to look at the room or an entry. Heat that is missing may explain a wrong
 # entry, so it comes first.
 _CHECKS = ("State it as a heater", "Look for a source", "Check it", "is not as stated", "airlens calibrate wall")

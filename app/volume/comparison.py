@@ -12,7 +12,11 @@ from app.experiment.boundary import read_sensors
 from app.experiment.folder import Experiment
 from app.volume.file import Beside, read_volume
 from app.volume.score import score_solution, truth_at
+from core.comfort import CELSIUS_K
 from core.result import Solution
+
+# Of the deviations that are stated of a reading: by chance one of 370 is left by more.
+_LEFT = 3.0
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,25 @@ def readings(experiment: Experiment, solution: Solution) -> list[Reading]:
                 if np.isfinite(m)
             ]
     return told
+
+
+def left_thermometers(experiment: Experiment, solution: Solution) -> tuple[str, ...]:
+    """Sentences on the thermometers whose reading the result leaves by more than three of its stated deviations.
+
+    The one that is farthest off is first: a wrong one pulls the result away from others too. Raises BadInputError.
+    """
+    off = {
+        one: abs(one.found - one.measured) / one.std
+        for one in readings(experiment, solution)
+        if one.name == "T"
+    }
+    return tuple(
+        f"The thermometer at ({', '.join(f'{x:.2f}' for x in one.position_m)}) m reads "
+        f"{one.measured - CELSIUS_K:.1f} °C; the result has {one.found - CELSIUS_K:.1f} °C there, which is "
+        f"{off[one]:.1f} of its stated deviations away. Check that thermometer."
+        for one in sorted(off, key=lambda one: -off[one])
+        if off[one] > _LEFT
+    )
 
 
 def _triple(place: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
