@@ -219,7 +219,9 @@ def _of_the_scene(experiment: Experiment, shown: str) -> Next | None:
     refused = _refused(experiment)
     if not refused:
         return None
-    return Next(Step.reconstruct, f"airlens reconstruct {shown}", f"mend experiment.toml first. It is {refused}")
+    return Next(
+        Step.reconstruct, f"airlens reconstruct {shown}", f"mend experiment.toml first. It is {refused}"
+    )
 
 
 def _refused(experiment: Experiment) -> str:
@@ -239,7 +241,9 @@ def _of_the_results(experiment: Experiment, shown: str) -> Next | None:
     if not results:
         return Next(Step.reconstruct, command, "both captures are there")
     if not (results[-1] / "result.nc").is_file():
-        return Next(Step.reconstruct, command, f"the newest result, {results[-1].name}, has lost its result.nc")
+        return Next(
+            Step.reconstruct, command, f"the newest result, {results[-1].name}, has lost its result.nc"
+        )
     used = read_manifest(results[-1]).get("captures", {})
     newest = {role: experiment.latest_capture(role).name for role in ("reference", "flow")}
     if isinstance(used, dict) and any(used.get(role, name) != name for role, name in newest.items()):

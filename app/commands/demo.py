@@ -107,4 +107,6 @@ def _tell(console: Console, story: "Story", folder: Path) -> None:
         console.print(
             f"See it move: airlens serve{data}, and open the address that it prints.", soft_wrap=True
         )
-    console.print(f"Go on with it: airlens reconstruct {shlex.quote(str(folder))} --preset reference", soft_wrap=True)
+    console.print(
+        f"Go on with it: airlens reconstruct {shlex.quote(str(folder))} --preset reference", soft_wrap=True
+    )

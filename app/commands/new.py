@@ -61,11 +61,14 @@ def _asked(folder: Path) -> "Experiment":
         return talk(folder, person)
     except EOFError as end:
         raise BadInputError(
-            f"The answers ended before {str(end)!r}. They are kept; `airlens new {shlex.quote(str(folder))}` goes on there. "
+            f"The answers ended before {str(end)!r}. They are kept; `airlens new {shlex.quote(str(folder))}` goes on "
+            "there. "
             "`airlens new --template wall-jet` prints a file to fill in instead."
         ) from None
     except KeyboardInterrupt:
-        typer.echo(f"\nWhat was answered is kept; `airlens new {shlex.quote(str(folder))}` goes on there.", err=True)
+        typer.echo(
+            f"\nWhat was answered is kept; `airlens new {shlex.quote(str(folder))}` goes on there.", err=True
+        )
         raise typer.Exit(130) from None
 
 

@@ -49,7 +49,9 @@ def show(made: "Plan") -> None:
     from core.plan.verdicts import BLIND
 
     console = Console()
-    console.print(f"Expected: {made.expected}; {made.expected_departure_k:.2g} K rms about the mean at each height.\n")
+    console.print(
+        f"Expected: {made.expected}; {made.expected_departure_k:.2g} K rms about the mean at each height.\n"
+    )
     best = max(view.picture_signal_to_noise for view in made.views)
     first = "bold red" if best < BLIND else "bold yellow" if best < VISIBLE else "bold"
     for place, sentence in enumerate(made.verdicts):

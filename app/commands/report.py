@@ -32,8 +32,8 @@ def export(
         Literal["nc", "h5", "vti", "csv", "zip", "png", "ply", "vtu", "pdf", "pvd"] | None,
         typer.Option(
             "--format",
-            help="By the output's name, or nc; zip is an OpenFOAM case, ply a surface of one temperature, vtu paths of "
-            "particles, pdf the report.",
+            help="By the output's name, or nc; zip is an OpenFOAM case, ply a surface of one temperature, vtu paths "
+            "of particles, pdf the report.",
         ),
     ] = None,
     output: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,

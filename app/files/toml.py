@@ -102,5 +102,5 @@ def _no_toml(error: str, source: str) -> str:
     todo = "Correct the file at that place."
     if twice:
         key = re.findall(r"'([^']*)'", twice[1])[-1]
-        todo = f"{key!r} is given twice: delete the line {key} = [], or what stands in its place, and keep the tables."
+        todo = f"{key!r} is given twice: delete the line {key} = [], or what stands in its place; keep the tables."
     return f"{where}: it is not valid TOML ({said}). {todo}"

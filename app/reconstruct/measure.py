@@ -242,8 +242,8 @@ def _check_captures(reference: Capture, flow: Capture, scene: Scene) -> None:
     for capture in (reference, flow):
         if len(capture.images) != len(scene.views):
             raise BadInputError(
-                f"{capture.folder} does not fit the scene: views pictured {len(capture.images)}, stated {len(scene.views)}. "
-                "Capture again with this scene."
+                f"{capture.folder} does not fit the scene: views pictured {len(capture.images)}, stated "
+                f"{len(scene.views)}. Capture again with this scene."
             )
         for image, view in zip(capture.images, scene.views, strict=True):
             expected = (view.camera.height_px, view.camera.width_px)

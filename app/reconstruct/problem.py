@@ -66,8 +66,8 @@ def _with_bundle(scene: Scene, bundle: Bundle) -> tuple[Scene, str]:
     afar = [view.name for number, view in enumerate(scene.views) if not _is_placed(scene, number, bundle)]
     if afar:
         told += (
-            f" The wall before {', '.join(afar)} is not calibrated, so what takes and lights its pictures stands where "
-            "experiment.toml says. Take the step: airlens calibrate wall."
+            f" The wall before {', '.join(afar)} is not calibrated, so what takes and lights its pictures stands "
+            "where experiment.toml says. Take the step: airlens calibrate wall."
         )
     return replace(scene, views=views, light=light), told
 

@@ -22,7 +22,13 @@ _PIXELS, _FRAMES = 2000, 100
 _DOUBTS = ("may be swapped", "does not match this capture", "Check that thermometer", "distrust")
 # Words of every sentence that sends people to look at the room or an entry. Heat that is missing may explain a wrong
 # entry, so it comes first.
-_CHECKS = ("State it as a heater", "Look for a source", "Check it", "is not as stated", "airlens calibrate wall")
+_CHECKS = (
+    "State it as a heater",
+    "Look for a source",
+    "Check it",
+    "is not as stated",
+    "airlens calibrate wall",
+)
 
 
 def summary(finding: Finding) -> tuple[str, ...]:

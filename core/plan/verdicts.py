@@ -74,8 +74,8 @@ def _verdict(scene: Scene, view: int, flow: ExpectedFlow, found: Signal, other_p
     if found.snr >= VISIBLE:
         return f"{seen}. Differences down to {found.smallest_visible_k:.2g} K stand out in one window."
     return (
-        f"{seen}; {VISIBLE:g} times are needed. This rig cannot see {found.contrast_k:.2g} K in one window: it would need "
-        f"{' or '.join(_remedies(scene, view, flow, found, other_p99_px))}."
+        f"{seen}; {VISIBLE:g} times are needed. This rig cannot see {found.contrast_k:.2g} K in one window: it would "
+        f"need {' or '.join(_remedies(scene, view, flow, found, other_p99_px))}."
     )
 
 

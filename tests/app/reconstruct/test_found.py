@@ -184,7 +184,9 @@ def test_what_is_proposed_can_be_stated_and_is_then_found_no_more():
     # As it is told: its last lines can be pasted below what airlens wrote.
     _, _, lines = one.sentence.partition("\n")
     written = to_toml(ExperimentSettings(scene=room()))
-    assert from_toml(f"{written}\n{lines}\n", ExperimentSettings, "experiment.toml").scene.objects == (one.box,)
+    assert from_toml(f"{written}\n{lines}\n", ExperimentSettings, "experiment.toml").scene.objects == (
+        one.box,
+    )
     stated = RoomObject(name=entry["name"], lower_m=tuple(entry["lower_m"]), upper_m=tuple(entry["upper_m"]))
     assert stated == one.box
     assert found(room((stated,)), picture)[1] == ()

@@ -110,7 +110,10 @@ def test_a_stated_grid_sizes_the_room():
 def test_a_camera_whose_wall_is_not_calibrated_has_its_lens_and_stands_where_the_scene_says(tmp_path):
     projector = replace(CAMERA, position_m=(0.5, -3.0, 0.0))
     scene = Scene(
-        room=ROOM, views=(View(camera=CAMERA),), light=ProjectedPattern(projector=projector), boundary=(INLET,)
+        room=ROOM,
+        views=(View(camera=CAMERA),),
+        light=ProjectedPattern(projector=projector),
+        boundary=(INLET,),
     )
     experiment = create_experiment(tmp_path / "one", ExperimentSettings(scene=scene))
     # As the steps camera and projector leave them: in the camera's own frame.

@@ -51,7 +51,9 @@ def test_each_category_says_of_what_it_is():
     experiment = Experiment(Path("nowhere"), settings)
     found = Finding(experiment, "one", {}, solution, tuple, lambda: pytest.fail("it needs no pictures"))
     people = summary(found)[0]
-    assert re.search(r"people find it .* are dissatisfied\), .*(category|worse).* of ISO 7730 for warmth, and", people)
+    assert re.search(
+        r"people find it .* are dissatisfied\), .*(category|worse).* of ISO 7730 for warmth, and", people
+    )
     assert people.endswith("category A to B for draught.")
 
 

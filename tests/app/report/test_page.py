@@ -104,7 +104,9 @@ def test_what_is_no_result_is_named_with_those_that_are(kept):
     folder, results = kept.experiment.folder, kept.experiment.results_folder
     for given in (results, folder / "nix"):
         for use in (report_again, indoor_of, lambda at, result: export(at, "csv", None, result)):
-            with pytest.raises(BadInputError, match=rf"{given} is no result\. Results of .*: {results / 'one'}\."):
+            with pytest.raises(
+                BadInputError, match=rf"{given} is no result\. Results of .*: {results / 'one'}\."
+            ):
                 use(folder, given)
 
 

@@ -74,5 +74,6 @@ def test_dark_frames_are_taken_with_the_lens_covered(tmp_path):
     experiment = create_experiment(tmp_path / "one", settings)
     with open_camera(experiment, air_of("dark")) as camera:
         burst = run_capture(camera, CapturePlan(role="dark", frames=2))
-    assert [(one.name, one.good) for one in burst.verdicts] == [("dark level", True)]
+    assert burst.verdicts[0].name == "dark level"
+    assert all(one.good for one in burst.verdicts)
     assert burst.mean.std() > 0.0

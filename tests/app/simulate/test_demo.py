@@ -9,8 +9,8 @@ from app.report.beside import places, rows
 from app.simulate.demo import WORLD, run_demo
 from app.simulate.worlds import LAB
 from app.volume.sample import SAMPLE_ROOM
-from core.significance import EITHER_WAY
 from core.objects import RoomObject
+from core.significance import EITHER_WAY
 from tests.app.report.test_indoor import OPENINGS, PLUG_ROOM, layered, replace
 
 
