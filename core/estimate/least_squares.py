@@ -11,10 +11,13 @@ viscosity, which nobody enters, has a Gaussian prior: with a Student's t it woul
 import equinox as eqx
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.stats import norm
 
 from core.estimate.observation import IMAGES
 
 _STUDENT_NU = 3.0
+# Share of the data that the model's error is taken from; the rest may be edges of jets.
+_COUNTED = 0.95
 LONGEST_STEP = 3.0
 
 
@@ -92,14 +95,31 @@ def weighted_variance(
     total = np.zeros_like(variance)
     for g in np.unique(group):
         own = group == g
-        wrong = max(spread(residual[own]) ** 2 - float(variance[own].mean()), 0.0)
+        wrong = beyond_noise(residual[own], variance[own])
         if g != IMAGES or not far:
-            wrong = min(wrong, spread(grid_difference[own]) ** 2)
+            wrong = min(wrong, beyond_noise(grid_difference[own], np.zeros(own.sum())))
         total[own] = variance[own] + alike[own] * wrong
     return total
+
+
+def beyond_noise(values: Float[np.ndarray, " some"], variance: Float[np.ndarray, " some"]) -> float:
+    """The variance that values have beyond that of their noise; 0 where they have less.
+
+    Values over their deviation are then spread as those of a normal distribution. Of twenty values the largest is not
+    counted: the edges of jets must not dominate.
+    """
+    count = int(np.ceil(_COUNTED * len(values)))
+    at = norm.ppf(0.5 + 0.5 * count / len(values))
+    normal = 1.0 if count == len(values) else 1.0 - 2.0 * at * norm.pdf(at) * len(values) / count
+    low, high = 0.0, float(np.square(values).max()) / normal
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        size = np.sort(np.square(values) / np.maximum(variance + middle, np.finfo(float).tiny))[:count]
+        low, high = (middle, high) if size.mean() > normal else (low, middle)
+    return float(0.5 * (low + high))
 
 
 def spread(values: Float[np.ndarray, " some"]) -> float:
     """Rms without the largest twentieth: the edges of jets must not dominate."""
     size = np.sort(np.abs(values))
-    return float(np.sqrt(np.mean(size[: max(1, int(0.95 * len(size)))] ** 2)))
+    return float(np.sqrt(np.mean(size[: int(np.ceil(_COUNTED * len(size)))] ** 2)))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from core.estimate.least_squares import gauss_newton, weighted_variance
+from core.estimate.least_squares import beyond_noise, gauss_newton, weighted_variance
 from core.estimate.parameter_step import secant
 
 
@@ -73,8 +73,26 @@ def test_far_from_the_truth_a_thermometer_holds_against_images_that_the_room_doe
 
 def test_noise_is_each_datums_own_and_what_a_model_has_wrong_is_shared():
     group, alike = np.zeros(1000, int), np.full(1000, 40.0)
-    residual = np.full(1000, 0.3)
+    residual = 0.3 * np.random.default_rng(0).normal(size=1000)
 
     variance = weighted_variance(np.full(1000, 0.01), alike, group, residual, np.full(1000, 1.0))
 
-    np.testing.assert_allclose(variance, 0.01 + 40.0 * (0.3**2 - 0.01), rtol=1e-6)
+    np.testing.assert_allclose(variance, 0.01 + 40.0 * (0.3**2 - 0.01), rtol=0.1)
+
+
+@pytest.mark.parametrize("uneven", [0.0, 0.5])
+@pytest.mark.parametrize("wrong", [0.0, 0.25, 1.0, 25.0])
+def test_what_a_model_has_wrong_is_told_from_noise_even_or_not(wrong: float, uneven: float):
+    draw = np.random.default_rng(0)
+    variance = np.exp(2.0 * uneven * draw.normal(size=20_000))
+    values = draw.normal(size=20_000) * np.sqrt(variance + wrong)
+
+    assert beyond_noise(values, variance) == pytest.approx(wrong, rel=0.05, abs=0.03)
+    # A twentieth of edges of jets does not count as itself.
+    values[::40] = 1e3
+    assert beyond_noise(values, variance) < 1.3 * wrong + 0.2
+
+
+def test_of_a_few_values_none_is_passed_over():
+    assert beyond_noise(np.array([0.01, 1.0]), np.full(2, 1e-4)) == pytest.approx(0.5, rel=1e-3)
+    assert beyond_noise(np.zeros(3), np.zeros(3)) == 0.0
