@@ -28,6 +28,8 @@ from core.geometry import WallName
 
 # At most so many things of one kind are in a room.
 MANY = 100
+# So many letters has a name at most.
+LONGEST = 200
 # What the first camera is called, which `camera` answers.
 FIRST = "camera"
 Pixels = Annotated[int, Field(ge=16, le=20_000)]
@@ -269,7 +271,7 @@ class AnemometerAnswer(Strict):
 class Answers(Strict):
     """All answers. `air` is the room's temperature when the reference picture is taken: no flow, no heat."""
 
-    title: str = ""
+    title: Annotated[str, Field(max_length=LONGEST)] = ""
     """A name for people; the room's size unless given."""
     room: tuple[Size, Size, Size]
     """Length along x, y and z."""

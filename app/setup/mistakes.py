@@ -4,6 +4,7 @@ A part with a mistake of its own is left out of the comparisons with others, so 
 """
 
 import json
+import math
 from collections.abc import Callable, Iterator, Mapping
 from itertools import combinations
 from typing import Any
@@ -28,7 +29,7 @@ from app.setup.answers import (
     ViewAnswer,
     WallAnswer,
 )
-from app.setup.units import Size
+from app.setup.units import LENS, Size
 from app.setup.view_mistakes import view_mistakes
 from core.geometry import Box, Vector3, face_of
 from core.objects import RoomObject, ready_object, shared_m
@@ -36,6 +37,8 @@ from core.scene import Patch, stands_before
 
 # Faster than any supply of a room.
 FASTEST_M_S = 50.0
+# Pixels of sensors, with room on both sides.
+_PITCH_M = (1e-7, 1e-4)
 _ONES: dict[str, Any] = {
     "room": tuple[Size, Size, Size],
     "camera": CameraAnswer,
@@ -102,6 +105,7 @@ def _contradictions(parts: Parts) -> list[Said]:
         _off_its_wall,
         _overlaps,
         _too_fast,
+        _no_lens,
         _nothing_left,
         _behind_the_wall,
         _outside_the_room,
@@ -194,6 +198,22 @@ def _too_fast(parts: Parts) -> Iterator[Said]:
                 (*path, "flow"),
                 f"{3600 * item.flow:g} m3/h through {area_m2:g} m2 is {item.flow / area_m2:.3g} m/s; air comes into "
                 f"a room slower than {FASTEST_M_S:g} m/s. Are the unit and the size of the opening right?",
+            )
+
+
+def _no_lens(parts: Parts) -> Iterator[Said]:
+    """Lenses whose two lengths make an angle of view that no lens has; it is told at the one that looks wrong."""
+    for path, item in _named(parts, "camera", "view"):
+        if item.focal_length is None or item.pixel_pitch is None:
+            continue
+        across_px = max(item.width_px, item.height_px)
+        angle_deg = 2 * math.degrees(math.atan2(across_px * item.pixel_pitch, 2 * item.focal_length))
+        if not LENS.low <= angle_deg <= LENS.high:
+            plausible = _PITCH_M[0] <= item.pixel_pitch <= _PITCH_M[1]
+            yield Said(
+                (*path, "focal_length" if plausible else "pixel_pitch"),
+                f"{across_px} pixels, {1e6 * item.pixel_pitch:g} um from one to the next, behind a lens of "
+                f"{1e3 * item.focal_length:g} mm see {angle_deg:.3g} degrees. {LENS.advice} Are both units right?",
             )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from app.errors import BadInputError
 from app.experiment.boundary import read_sensor_table
 from app.experiment.folder import Experiment, ExperimentSettings
-from app.setup.answers import MANY
+from app.setup.answers import LONGEST, MANY
 from app.setup.eye_readback import camera_answer, light_answers, projector_answer, view_answers
 from app.setup.written import SceneReading, celsius, metres
 from core.geometry import Vector3, face_of
@@ -55,7 +55,7 @@ def scene_back(settings: ExperimentSettings) -> ReadBack:
     told = SceneReading(settings.scene.room.lower_m)
     view = asked_view(settings.scene)
     answers: dict[str, Any] = {
-        "title": settings.title,
+        "title": settings.title[:LONGEST],
         "room": [metres(value) for value in settings.scene.room.size_m],
         "air": celsius(settings.scene.air.ambient_temperature_k),
         "camera": camera_answer(settings, view, told),

@@ -43,7 +43,9 @@ _EXAMPLES = {
     "share": "5 %",
     "power": "75 W",
 }
-_WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*")
+_WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d.,].*?)?\s*")
+# A decimal comma; two commas, or a point beside one, are none.
+_COMMA = re.compile(r"\s*[-+]?\d+,\d+(?![.,\d]).*")
 # Temperatures of air, walls and heaters in a room.
 _COLDEST_K, _HOTTEST_K = 200.0, 800.0
 
@@ -52,9 +54,15 @@ def to_si(text: Any, kind: str) -> float:
     """The SI value of a text such as "45 cm". Raises ValueError: not text, no unit, an unknown unit."""
     units = UNITS[kind]
     known = f"a number and its unit ({', '.join(units)}), such as {_EXAMPLES[kind]!r}"
-    written = _WRITTEN.fullmatch(text) if isinstance(text, str) else None
-    if written is None:
+    if not isinstance(text, str):
         raise ValueError(f"{text!r} is no {kind}; expected {known}, in quotes.")
+    if not text.strip():
+        raise ValueError(f"it is empty; expected {known}.")
+    if _COMMA.fullmatch(text):
+        raise ValueError(f"{text!r} has a comma; write {text.strip().replace(',', '.')!r}, with a point.")
+    written = _WRITTEN.fullmatch(text)
+    if written is None:
+        raise ValueError(f"{text!r} is no {kind}; expected {known}.")
     number, unit = float(written[1]), (written[2] or "").replace("°", "")
     if not unit:
         raise ValueError(f"{text!r} has no unit; expected {known}.")
@@ -143,7 +151,9 @@ Speed = Annotated[
     float, Written("speed", -100.0, 100.0, "Air in a room is slower than 100 m/s: is the unit right?")
 ]
 Time = Annotated[float, Written("time", 1e-6, 60.0, "It lies between 0.001 ms and 60 s.")]
-Angle = Annotated[float, Written("angle", 1.0, 170.0, "A lens sees 1 to 170 degrees.")]
+# What a lens sees, in degrees across the picture.
+LENS = Written("angle", 1.0, 170.0, "A lens sees 1 to 170 degrees.")
+Angle = Annotated[float, LENS]
 Share = Annotated[float, Written("share", 1e-4, 1.0, "It is 0.01 to 100 %.")]
 Power = Annotated[float, Written("power", -1e5, 1e5, "A person gives 75 W: is the unit right?")]
 PowerDeviation = Annotated[float, Written("power", 0.1, 1e5, "A deviation is 0.1 W to 100 kW.")]

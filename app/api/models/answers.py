@@ -75,7 +75,7 @@ class NewAnswers(WireModel):
 
 
 class MistakeResource(WireModel):
-    """What is wrong at one field, such as `supply[0].flow`."""
+    """What is wrong at one field, such as `supply[0].flow`; `field` is empty where it is wrong of all together."""
 
     field: str
     sentence: str

@@ -122,7 +122,10 @@ def check_answers(given: Given, sent: SentAnswers) -> CheckResource:
         return CheckResource(mistakes=lines, told=None)
     answers = parse(sent.answers, Answers, ANSWERS_FILE)
     corner_m = corner_of(_room(given, sent.answers)) if found is None else found.settings.scene.room.lower_m
-    return CheckResource(mistakes=[], told=_told(settings_of(answers, corner_m)))
+    try:
+        return CheckResource(mistakes=[], told=_told(settings_of(answers, corner_m)))
+    except BadInputError as error:
+        return CheckResource(mistakes=[MistakeResource(field="", sentence=str(error))], told=None)
 
 
 @router.post("/experiments/from-answers", status_code=201)

@@ -42,7 +42,8 @@ WRONG: list[tuple[Keys, Any, str, str]] = [
     (("air",), "warm", "air", r"'warm' is no temperature; expected a number"),
     (("supply", 0, "temperature"), "26 K", "supply[0].temperature", r"out of range"),
     (("supply", 0, "temperature"), "299 C", "supply[0].temperature", r"write 299 K for 25.85 C"),
-    (("outlet", 0, "temperature"), "22,4 C", "outlet[0].temperature", r"expected a number and its unit"),
+    (("outlet", 0, "temperature"), "22,4 C", "outlet[0].temperature", r"has a comma; write '22.4 C'"),
+    (("room", 1), "", "room[1]", r"it is empty; expected a number and its unit \(m, cm.*'2.7 m'\.$"),
     (("supply", 0, "upper", 0), "200 m", "supply[0].upper[0]", r"not on x_min.*millimetres \(200 mm\)"),
     (("supply", 0, "upper", 0), "1800 m", "supply[0].upper[0]", r"millimetres"),
     (("supply", 0, "flow"), "120 m3", "supply[0].flow", r"'m3' is no unit of volume flow.*m3/h"),
@@ -54,6 +55,14 @@ WRONG: list[tuple[Keys, Any, str, str]] = [
     (("camera", "exposure"), "500 s", "camera.exposure", r"60 s"),
     (("camera", "focal_length"), "10", "camera.focal_length", r"has no unit"),
     (("camera", "distance"), "0 m", "camera.distance", r"above zero"),
+    # Lenses.
+    (("camera", "pixel_pitch"), "5.86 mm", "camera.pixel_pitch", r"5860 um .* of 10 mm see 180 degrees"),
+    (
+        ("camera", "focal_length"),
+        "400 m",
+        "camera.focal_length",
+        r"400000 mm see 0.00161 degrees.*units right",
+    ),
     # Places.
     (("supply", 0, "upper", 1), "2.9 m", "supply[0].upper[1]", r"2.3 to 2.9 m along z is not on x_min"),
     (("supply", 0, "lower", 0), "-0.2 m", "supply[0].lower[0]", r"-0.2 to 1.8 m along y is not on x_min"),
@@ -93,6 +102,7 @@ WRONG: list[tuple[Keys, Any, str, str]] = [
         "object[0].size[2]",
         r"it is 12 m long along z, more than the room's",
     ),
+    (("title",), "n" * 201, "title", r"at most 200"),
     # What contradicts itself.
     (("outlet",), GONE, "supply", r"1 supplies and 0 outlets: air that comes in must leave"),
     (("supply",), GONE, "outlet", r"0 supplies and 1 outlets"),

@@ -33,6 +33,10 @@ def test_a_number_with_its_unit(text, kind, si):
     [
         ("18", "has no unit"),
         (18, "in quotes"),
+        ("", "it is empty; expected a number and its unit"),
+        ("18,5 C", "has a comma; write '18.5 C'"),
+        ("-2,5", "has a comma; write '-2.5'"),
+        ("1,200.5 C", "no temperature"),
         ("18 R", "no unit of temperature"),
         ("warm", "no temperature"),
     ],

@@ -55,6 +55,15 @@ def test_an_experiment_is_made_from_answers_and_its_answers_are_changed(client: 
     assert client.answers(made.experiment).answers == changed
 
 
+def test_a_check_tells_what_no_field_alone_has_wrong(client: Client):
+    sent = answers_of(client, "wall-jet")
+    sent["camera"] = {**sent["camera"], "distance": "1 um"}
+    found = client.check_answers(sent)
+    assert [one.field for one in found.mistakes] == [""]
+    assert "printed pattern pixel" in found.mistakes[0].sentence
+    assert found.told is None
+
+
 def test_wrong_answers_make_nothing_and_change_nothing(client: Client):
     before = len(client.experiments())
     sent = answers_of(client, "wall-jet")
