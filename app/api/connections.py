@@ -12,6 +12,8 @@ from typing import Any
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from app.api.security.guard import STREAMS
+
 # Headers come in one packet; this is for the slowest line.
 HEADERS_S = 10.0
 # A body may take so long, and longer by what came at this pace (a modem's is 7 kB/s).
@@ -129,6 +131,12 @@ class PatientProtocol(HttpToolsProtocol):
         self._stop()
         self._gate.leave(self)
         super().handle_websocket_upgrade()
+
+    def shutdown(self) -> None:
+        """The service stops: an answer without an end is ended, another one is finished."""
+        super().shutdown()
+        if self.cycle is not None and not self.cycle.response_complete and self.scope["path"] in STREAMS:
+            self.transport.close()
 
     def end(self) -> None:
         """Close at once, and make room."""

@@ -1,10 +1,17 @@
 """Silent connections make room: counted, not timed."""
 
+import contextlib
 import socket
+import time
+
+import httpx
+import pytest
 
 from app.api import connections, server
 from app.api.connections import Gate, most_connections
+from drivers.simulated import SimulatedCamera
 from tests.app.api.conftest import Live
+from tests.app.rig.test_live_camera import SCENE
 
 
 def silent(port: int, sent: bytes) -> socket.socket:
@@ -86,6 +93,30 @@ def test_who_takes_too_long_to_ask_is_ended(tmp_path, monkeypatch):
                     assert held.recv(1000) == b""
                 except ConnectionResetError:
                     pass
+
+
+@pytest.mark.parametrize("path", ["/api/events", "/api/devices/camera/live.mjpeg"])
+def test_a_page_that_is_open_does_not_hold_up_the_end_of_the_service(tmp_path, capfd, path):
+    from app.api.factory import create_app
+    from app.api.security.settings import new_token, service_config
+
+    bound = server.listen("127.0.0.1", 0)
+    port, token = bound.getsockname()[1], new_token()
+    app = create_app(service_config(tmp_path, token, port))
+    app.state.services.camera.open("lab", lambda: SimulatedCamera(lambda: SCENE, seed=1))
+    with contextlib.ExitStack() as held:
+        with server.serving(app, bound):
+            client = held.enter_context(
+                httpx.Client(headers={"Authorization": f"Bearer {token}"}, timeout=60)
+            )
+            streamed = held.enter_context(client.stream("GET", f"http://127.0.0.1:{port}{path}"))
+            assert streamed.status_code == 200
+            parts = streamed.iter_raw()
+            next(parts)
+            began_s = time.monotonic()
+        # Two seconds are those that an answer has which comes to its end.
+        assert time.monotonic() - began_s < 1.9
+    assert capfd.readouterr().err == ""
 
 
 class Line:
