@@ -8,6 +8,7 @@ import numpy as np
 
 from app.errors import explained
 from app.experiment.found import Found, found_in
+from app.report.doubts import checks, doubts
 from app.report.finding import Finding
 from app.report.indoor import Quantity
 from app.report.indoor import told as line_of
@@ -18,17 +19,6 @@ from core.significance import EITHER_WAY
 
 # A camera of fewer pixels, or a mean of fewer frames, sees less than a usual one.
 _PIXELS, _FRAMES = 2000, 100
-# Words of every sentence that bids distrust of a whole result. Swapped pictures explain the rest, so they come first.
-_DOUBTS = ("may be swapped", "does not match this capture", "Check that thermometer", "distrust")
-# Words of every sentence that sends people to look at the room or an entry. Heat that is missing may explain a wrong
-# entry, so it comes first.
-_CHECKS = (
-    "State it as a heater",
-    "Look for a source",
-    "Check it",
-    "is not as stated",
-    "airlens calibrate wall",
-)
 
 
 def summary(finding: Finding) -> tuple[str, ...]:
@@ -175,22 +165,6 @@ def _advice(finding: Finding) -> Iterable[str]:
             f"Solve on a finer grid than {scene.solve.grid} cells (scene.solve.grid, or the preset reference): "
             "a coarse one smears the jet."
         )
-
-
-def doubts(sentences: Iterable[str]) -> tuple[str, ...]:
-    """Of what a result says, what must be looked into before it is believed, the most telling first."""
-    return _picked(sentences, _DOUBTS)
-
-
-def checks(sentences: Iterable[str]) -> tuple[str, ...]:
-    """Of what a result says, what is to be looked at in the room or among the entries, missing heat first."""
-    return _picked(sentences, _CHECKS)
-
-
-def _picked(sentences: Iterable[str], words: Sequence[str]) -> tuple[str, ...]:
-    """The sentences with any of these words, in the order of the words."""
-    said = tuple(sentences)
-    return tuple(dict.fromkeys(one for word in words for one in said if word in one))
 
 
 def _doubts_of(finding: Finding) -> tuple[str, ...]:

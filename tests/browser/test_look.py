@@ -17,6 +17,7 @@ from app.files.durable import write_json, write_text
 from app.files.toml import to_plain
 from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.file import read_volume
+from core.estimate.diagnostics import doubtful
 from core.objects import RoomObject
 from core.result import Departures, Outcome, Solution
 from core.scene import PointSensors
@@ -140,7 +141,9 @@ def test_fields_truth_two_results_and_three_dimensions(station: Station, opens: 
     page.get_by_role("button", name="Look", exact=True).click()
     slices = page.locator(".slice canvas")
     expect(slices.first).to_have_attribute("data-painted", PAINTED)
-    expect(page.locator("main")).to_contain_text("T: rms error of departures")
+    expect(page.locator("main")).to_contain_text(
+        "T: rms error over the rms departure from each height's mean"
+    )
     choose(page, "T_error")
     expect(page.locator(".bar").first).to_contain_text("found minus true")
     snapshot(page, "look-error")
@@ -260,6 +263,32 @@ def test_what_was_found_goes_to_the_rooms_editor_by_one_click(station: Station, 
     page.get_by_role("button", name="Add what stands here: found 1").click()
     expect(page.get_by_role("group", name="object 1").get_by_label("Size along z")).to_have_value("1.2 m")
     assert watched.complaints == []
+
+
+def test_why_a_result_is_not_to_be_believed_stands_above_its_picture(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        name = client.create_experiment(camera_px=64).experiment
+    experiment = station.app.state.services.folders.open(name)
+    (wrong,) = doubtful(0.57)
+    for result, notes in (("20260101T000000-standard", []), ("20260101T000030-standard", [wrong])):
+        keep(experiment, result, room(), "standard", 1.0)
+        folder = experiment.results_folder / result
+        write_manifest(
+            folder,
+            read_manifest(folder)
+            | {"assumed": notes, "created": f"2026-01-01T00:00:{'30' if notes else '00'}+00:00"},
+        )
+    page = opens(station.address).page
+    page.get_by_role("button", name="Look", exact=True).click()
+    told = page.get_by_role("note")
+    expect(told).to_have_text(re.compile(r"Before you believe this: .*wrong by 57 % .*distrust the velocity"))
+    assert told.bounding_box()["y"] < page.locator(".volume").bounding_box()["y"]
+    snapshot(page, "look-doubt")
+    # Two of one minute have names of their own.
+    names = page.locator(".picked select").first.locator("option").all_inner_texts()
+    assert len({one.split(", ±")[0] for one in names}) == 2
+    choose(page, "20260101T000000-standard", "Result")
+    expect(told).to_have_count(0)
 
 
 def test_a_sequence_is_looked_at_moment_by_moment(station: Station, opens: Opens):

@@ -62,6 +62,7 @@ class FoundResource(WireModel):
 class ResultResource(WireModel):
     """A result: its grid, its fields, how it ended, and the manifest that says where it came from.
 
+    `doubts` are those of its notes that must be looked into before it is believed, the most telling first.
     `time_s` is when each burst of a sequence began; fields of a burst are asked for as NAME.NUMBER, from 0.
     """
 
@@ -75,6 +76,7 @@ class ResultResource(WireModel):
     advice: str
     solver_s: float
     notes: list[str]
+    doubts: list[str]
     found: list[FoundResource]
     manifest: dict[str, Any]
 

@@ -40,6 +40,7 @@ from app.errors import BadInputError
 from app.experiment.folder import Experiment, read_manifest
 from app.experiment.found import Found, found_in
 from app.files.reading import reading
+from app.report.doubts import doubts
 from app.setup.readback import answer_of
 
 router = APIRouter(tags=["results"])
@@ -80,6 +81,7 @@ def read_result(given: Given, experiment: Identifier, result: Identifier) -> Res
         advice=solution.outcome.value,
         solver_s=solution.solver_s,
         notes=list(solution.notes),
+        doubts=list(doubts(manifest.get("assumed", ()))),
         found=[_found(one, of) for one in found_in(manifest)],
         manifest=manifest,
     )
@@ -189,13 +191,17 @@ def list_presets() -> list[PresetResource]:
 
 
 def _score_lines(scored: dict[str, Any]) -> list[ScoreResource]:
-    """The figures that README tells, by name; left out where a quantity was not solved for."""
+    """The figures that README and the report tell; left out where a quantity was not solved for."""
     temperature, velocity, pressure = scored["T"], scored["u"], scored["p"]
     lines = [
         ("T: rms error", temperature["rms_K"], "K"),
         ("T: rms error of the air, without walls' surfaces", temperature["air"]["rms_K"], "K"),
         ("T: rms error of the still air everywhere, for comparison", temperature["trivial"]["ambient"], "K"),
-        ("T: rms error of departures from each height's mean", temperature["departure_of_departures"], "1"),
+        (
+            "T: rms error over the rms departure from each height's mean (1: as good as these means)",
+            temperature["rel_departure"],
+            "1",
+        ),
     ]
     if velocity is not None:
         lines.append(("velocity: rms error over the rms of velocity", velocity["rel"], "1"))

@@ -10,17 +10,12 @@ from app.experiment.captures import newest_pair
 from app.experiment.folder import Experiment, ExperimentSettings
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
 from app.reconstruct.agreement import rendered_agreement
-from app.report.answer import checks, doubts, summary, ventilates
+from app.report.answer import summary, ventilates
+from app.report.doubts import doubts
 from app.report.finding import Finding
 from app.report.indoor import Quantity
-from core.estimate.diagnostics import doubtful, missing_heat, other_way, suspicion
-from core.room.boundary_conditions import SuspectedHeater
-from core.scene import Patch
 from tests.app.reconstruct.test_problem import captured
 from tests.app.report.test_indoor import OPENINGS, PLUG_ROOM, layered
-from tests.core.estimate.test_temperature_levels import problem
-
-FLOOR = Patch(wall="z_min", lower_m=(0.8, 0.8), upper_m=(1.2, 1.2))
 
 
 @pytest.mark.parametrize(
@@ -37,11 +32,6 @@ def test_a_room_is_compared_with_a_mixed_one_only_where_its_interval_says_so(val
     told = ventilates(Quantity("efficiency", "air change efficiency", "%", value, low, high))
     assert words in told
     assert "mixed: 50 %" in told
-
-
-def test_what_bids_distrust_is_picked_from_all_that_a_result_says_the_most_telling_first():
-    said = (*doubtful(0.2), *doubtful(0.7), *other_way(0.1), *other_way(-0.8), "No still border was found.")
-    assert doubts(said) == (*other_way(-0.8), *doubtful(0.7))
 
 
 def test_each_category_says_of_what_it_is():
@@ -61,14 +51,3 @@ def test_a_pattern_that_is_not_the_scenes_is_told_before_the_answer(tmp_path):
     experiment = captured(tmp_path / "one", "displacement")
     mirrored = rendered_agreement(experiment.settings.scene, newest_pair(experiment).reference)
     assert doubts(["nothing", mirrored]) == (mirrored,)
-
-
-def test_what_is_to_be_looked_at_comes_from_what_the_fit_says_heat_before_entries():
-    given, panel = problem(stated=True), SuspectedHeater(patch=FLOOR, temperature_k=293.15)
-    heat, gone = suspicion(given, panel, 40.0), missing_heat(given, panel, 0.8)
-    entry = "The measurements say that inlet 1 on x_min supplies 0.84 times the velocity entered. Check it."
-    level = "A source, a leak or a wall is not as stated."
-    said = (level, entry, *doubtful(0.7), *doubtful(0.2), *heat, gone, "No still border was found.")
-
-    assert heat
-    assert checks(said) == (*heat, gone, entry, level)

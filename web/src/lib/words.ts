@@ -28,11 +28,11 @@ export function curveName(name: string): string {
   return `${words}${number}${unit ? ` [${unit}]` : ""}`;
 }
 
-/** "standard, 19:39"; with its day where that is not today, and its uncertainty where that was read. */
+/** "standard, 19:39:05"; with its day where that is not today, and its uncertainty where that was read. */
 export function resultName(one: ResultLine, spread_k?: number): string {
   const made = one.created ? new Date(one.created) : null;
   const today = made?.toDateString() === new Date().toDateString();
-  const time = one.created ? momentOf(one.created).slice(today ? 11 : 0) : "";
+  const time = made ? `${momentOf(one.created).slice(today ? 11 : 0)}:${two(made.getSeconds())}` : "";
   const spread = spread_k === undefined ? "" : `± ${spread_k.toPrecision(2)} K`;
   return [one.preset ?? "result", time, spread].filter(Boolean).join(", ");
 }

@@ -17,6 +17,7 @@ from app.experiment.found import Found
 from app.experiment.results import write_result
 from app.files.toml import to_plain
 from app.volume.score import score_experiment
+from core.estimate.diagnostics import doubtful
 from core.objects import RoomObject
 from core.result import Outcome, Solution
 from core.scene import PointSensors
@@ -62,6 +63,20 @@ def test_a_result_tells_its_grid_fields_and_end(airlens: Client, made: tuple[str
         ["straight rays"],
     )
     assert result.y_m == AXES[1].tolist()
+
+
+def test_what_must_be_looked_into_before_a_result_is_believed_is_told_apart(
+    airlens: Client, live: Live, made: tuple[str, str]
+):
+    folder = live.app.state.services.folders.folder(made[0]) / "results" / made[1]
+    before = read_manifest(folder)
+    assert airlens.result(*made).doubts == []
+    (wrong,) = doubtful(0.57)
+    write_manifest(folder, before | {"assumed": ["Straight rays.", wrong]})
+    told = airlens.result(*made).doubts
+    write_manifest(folder, before)
+    assert told == [wrong]
+    assert "distrust the velocity" in wrong
 
 
 BOX = RoomObject(name="found 1", lower_m=(0.5, -0.5, 0.0), upper_m=(0.9, -0.1, 1.2))
@@ -162,10 +177,11 @@ def test_a_simulated_room_shows_its_truth_and_the_error(airlens: Client, live: L
     assert airlens.volume(*made, "T_error") == pytest.approx(error, abs=1e-4)
     folder = live.app.state.services.folders.folder(made[0])
     scores = {one.name: one.value for one in airlens.comparison(*made).scores}
-    assert (
-        scores["T: rms error"]
-        == score_experiment(folder, folder / "truth.npz", folder / "results" / "r1")["T"]["rms_K"]
-    )
+    # The report's figures.
+    reported = score_experiment(folder, folder / "truth.npz", folder / "results" / "r1")["T"]
+    assert scores["T: rms error"] == reported["rms_K"]
+    (relative,) = (value for name, value in scores.items() if "each height's mean" in name)
+    assert relative == reported["rel_departure"]
 
 
 def test_point_sensors_stand_beside_what_was_found_there(airlens: Client, live: Live, made: tuple[str, str]):
