@@ -124,7 +124,7 @@ class Written:
 
 
 Size = Annotated[
-    float, Written("length", 0.1, 200.0, "A room is 0.1 to 200 m long: are these millimetres (4000 mm)?")
+    float, Written("length", 0.1, 100.0, "A room is 0.1 to 100 m long: are these millimetres (4000 mm)?")
 ]
 Length = Annotated[
     float, Written("length", -500.0, 500.0, "It lies within 500 m: are these millimetres (450 mm)?")

@@ -34,7 +34,7 @@ WRONG: list[tuple[Keys, Any, str, str]] = [
     (("room", 0), "4000 m", "room[0]", r"'4000 m' is out of range.*millimetres \(4000 mm\)"),
     (("room", 2), "27", "room[2]", r"'27' has no unit; expected a number and its unit \(m, cm"),
     (("room", 1), "3 l", "room[1]", r"'l' is no unit of length"),
-    (("room", 1), "3 cm", "room[1]", r"A room is 0.1 to 200 m long"),
+    (("room", 1), "3 cm", "room[1]", r"A room is 0.1 to 100 m long"),
     (("air",), "20 K", "air", r"'20 K' is out of range.*is the unit right"),
     (("air",), "293 C", "air", r"'293 C' looks like kelvin: write 293 K for 19.85 C"),
     (("air",), "20", "air", r"has no unit"),
