@@ -21,7 +21,8 @@ from app.plan.task import task_in
 from app.plan.under_way import UnderWay
 from app.reconstruct.agreement import rendered_agreement
 from app.reconstruct.measure import Measurement, measure
-from app.reconstruct.presets import AUTO, check_data_term, resolved, solved
+from app.reconstruct.names import AUTO
+from app.reconstruct.presets import check_data_term, resolved, solved
 from app.reconstruct.presets import preset as preset_called
 from app.reconstruct.problem import known_of, problem_of
 from app.reconstruct.sequence import check_sequence, with_departures

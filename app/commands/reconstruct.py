@@ -23,8 +23,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-# Known here by name, so that a shell completes them without what they solve with.
-PRESETS = ("auto", "draft", "standard", "reference", "grid", "paper")
+from app.reconstruct.names import NAMES
 
 
 def register(cli: typer.Typer) -> None:
@@ -37,7 +36,7 @@ def reconstruct(
     preset: Annotated[
         str,
         typer.Option(
-            autocompletion=lambda: list(PRESETS),
+            autocompletion=lambda: list(NAMES),
             help="How to solve: draft, standard, reference, grid, paper; auto is standard where walls and "
             "supply are stated, else draft.",
         ),

@@ -5,7 +5,8 @@ What the preset does not look at is not told.
 
 from dataclasses import replace
 
-from app.reconstruct.presets import AUTO, STANDARD, resolved, sized
+from app.reconstruct.names import AUTO
+from app.reconstruct.presets import STANDARD, resolved, sized
 from core.plan.choice import Choice
 from core.plan.choices import resolve
 from core.plan.expected import ExpectedFlow

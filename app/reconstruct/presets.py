@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from app.errors import BadInputError
+from app.reconstruct.names import AUTO, known
 from core.checkpoint import ForeignCheckpointError
 from core.known import level_of
 from core.problem import Problem
@@ -27,8 +28,6 @@ class Solve(Protocol):
         ...
 
 
-# What every door takes where nobody chooses.
-AUTO = "auto"
 STANDARD = RoomSettings()
 # Where walls are unknown the search may still gain after the eight rounds of `standard`; it ends where it does not.
 REFERENCE = RoomSettings(cells=64, coarse_cells=40, restart_s=120.0, rounds=16, renewals=4)
@@ -104,10 +103,7 @@ def resolved(name: str, scene: Scene) -> str:
 
 def preset(name: str) -> Solve:
     """The preset called `name`. Raises BadInputError."""
-    try:
-        return PRESETS[name]
-    except KeyError:
-        raise BadInputError(f"There is no preset {name!r}; known: {', '.join((AUTO, *PRESETS))}.") from None
+    return PRESETS[known(name)]
 
 
 def check_data_term(name: str, scene: Scene) -> None:

@@ -12,7 +12,7 @@ from app.commands import COMMANDS
 from app.commands.calibrate import STEPS
 from app.commands.lazy import commands_of
 from app.commands.print import SHEETS
-from app.commands.reconstruct import PRESETS as NAMES
+from app.reconstruct.names import NAMES
 from app.reconstruct.presets import PRESETS
 
 # Each costs between a third of a second and several.

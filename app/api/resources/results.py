@@ -184,7 +184,8 @@ _ENDINGS = {"pvd": "-bursts.zip"}
 @router.get("/presets")
 def list_presets() -> list[PresetResource]:
     """List the ways to solve: what serves where nobody chooses, then the quickest first."""
-    from app.reconstruct.presets import AUTO, PRESETS, resolved
+    from app.reconstruct.names import AUTO
+    from app.reconstruct.presets import PRESETS, resolved
 
     ways = {AUTO: resolved, **PRESETS}
     return [PresetResource(preset=name, about=_first_line(way)) for name, way in ways.items()]

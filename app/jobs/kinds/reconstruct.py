@@ -16,6 +16,7 @@ from pydantic import Field
 from app.files.toml import Strict, parse
 from app.jobs.attempt import SHOWN_EVERY_S, Attempt, AttemptStoppedError
 from app.jobs.checkpoints import FolderStore
+from app.reconstruct.names import known
 
 if TYPE_CHECKING:
     from core.result import Solution
@@ -34,7 +35,9 @@ class ReconstructSettings(Strict):
 
 def read(settings: Mapping[str, Any]) -> ReconstructSettings:
     """Return the settings. Raises BadInputError."""
-    return parse(dict(settings), ReconstructSettings, source="the settings of a reconstruction")
+    found = parse(dict(settings), ReconstructSettings, source="the settings of a reconstruction")
+    known(found.preset)
+    return found
 
 
 def target(order: Mapping[str, Any], folder: Path) -> Path:

@@ -36,6 +36,13 @@ def test_a_job_is_queued_run_and_its_curves_are_read(airlens: Client):
     assert job.job in [listed.job for listed in airlens.jobs(state="done")]
 
 
+def test_a_job_that_could_only_fail_is_not_queued(airlens: Client):
+    experiment = airlens.create_experiment(camera_px=64).experiment
+    with pytest.raises(ServiceError, match="There is no preset 'nope'; known: auto, draft") as refused:
+        airlens.submit_job("reconstruct", {"preset": "nope"}, experiment=experiment)
+    assert refused.value.problem.code == "bad_input"
+
+
 def test_the_same_key_gives_the_same_job(airlens: Client):
     first = airlens.submit_job("noise-study", STUDY, key="a-key-of-mine")
     assert airlens.submit_job("noise-study", STUDY, key="a-key-of-mine").job == first.job
