@@ -34,6 +34,36 @@ def test_a_reload_and_the_way_back_keep_page_experiment_and_result(station: Stat
     expect(page.locator("main")).to_have_attribute("aria-label", "Look")
 
 
+def test_an_address_of_what_is_not_there_says_so_and_no_other_result_is_asked_for(
+    station: Station, opens: Opens
+):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        first = client.create_experiment("First room", camera_px=64).experiment
+        second = client.create_experiment("Second room", camera_px=64).experiment
+    experiment = station.app.state.services.folders.open(first)
+    keep(experiment, "20260101T000000-standard", room(), "standard", 1.0)
+    watched = opens(station.address)
+    page = watched.page
+    page.get_by_label("Experiment").select_option(first)
+    page.get_by_role("button", name="Look", exact=True).click()
+    expect(page.locator(".slice canvas").first).to_be_visible()
+    page.evaluate(f"location.hash = '#/look/{second}'")
+    expect(page.locator("main")).to_contain_text("There is no finished result yet")
+    page.evaluate("location.hash = '#/look/%zz'")
+    expect(page.get_by_role("alert")).to_contain_text("There is no experiment %zz.")
+    expect(page.get_by_label("Experiment")).to_have_value(second)
+    page.goto("about:blank")
+    page.goto(f"{station.address.split('#')[0]}#/rig/nobody")
+    expect(page.get_by_role("alert")).to_contain_text("There is no experiment nobody.")
+    # The new experiment's page keeps the one that is chosen.
+    page.get_by_label("Experiment").select_option(first)
+    page.get_by_role("button", name="New experiment", exact=True).click()
+    expect(page).to_have_url(re.compile(f"#/new/{first}$"))
+    page.reload()
+    expect(page.get_by_label("Experiment")).to_have_value(first)
+    assert watched.complaints == []
+
+
 def test_the_camera_of_one_experiment_is_not_shown_under_another(station: Station, opens: Opens):
     with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
         first = client.create_experiment("First room", camera_px=64).experiment

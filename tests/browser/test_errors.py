@@ -62,6 +62,7 @@ def test_every_page_shows_a_refusal_in_the_services_words(station: Station, open
     expect(page.locator(".library")).to_contain_text("4 frames")
     shutil.rmtree(experiment.captures_folder)
     page.get_by_role("button", name="Discard", exact=True).click()
+    page.get_by_role("button", name="Discard for good").click()
     told(page, "has no capture", "List the parent resource to see what there is.")
 
 

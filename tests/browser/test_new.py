@@ -338,6 +338,115 @@ def test_a_mistake_is_told_at_its_field_while_it_is_typed_and_can_be_undone(stat
     expect(field).to_have_value("3 m")
 
 
+def test_a_coordinate_that_is_emptied_keeps_its_place_and_the_others_keep_theirs(
+    station: Station, opens: Opens
+):
+    page = opens(station.address).page
+    page.get_by_role("button", name="New experiment").click()
+    page.get_by_role("radio", name="Another camera").check()
+    thing = page.get_by_role("group", name="supply 1").first
+    lengths = [page.locator(f"input[name='room[{axis}]']") for axis in range(3)]
+    for first, others, text in (
+        (lengths[0], lengths[1:], "5"),
+        (thing.get_by_label("y from"), [thing.get_by_label("z from"), thing.get_by_label("y to")], "1.3"),
+    ):
+        before = [one.input_value() for one in others]
+        first.click()
+        page.keyboard.press("Control+a")
+        page.keyboard.press("Delete")
+        expect(first).to_have_value("")
+        expect(first).to_have_attribute("aria-invalid", "true")
+        assert [one.input_value() for one in others] == before
+        page.keyboard.type(text)
+        first.blur()
+        expect(first).to_have_value(f"{text} m")
+        assert [one.input_value() for one in others] == before
+    expect(page.locator("button.next")).to_have_text("Create the experiment")
+    # What is to correct is called as the form calls it.
+    page.get_by_role("button", name="Add supply", exact=True).click()
+    page.get_by_role("button", name="Add supply", exact=True).click()
+    wrong = page.locator("section[aria-labelledby=wrong-title]")
+    expect(wrong).to_contain_text("supply 3: it overlaps supply 2")
+    page.get_by_role("button", name="Remove supply 3").click()
+    page.get_by_role("group", name="supply 2").first.get_by_label("z to").fill("9")
+    expect(wrong).to_contain_text(re.compile("supply 2, z to: 1 to 9 m along z is not on x_min"))
+    snapshot(page, "new-to-correct")
+
+
+def test_pictures_that_are_brought_are_still_brought_after_a_reload(station: Station, opens: Opens):
+    page = opens(station.address).page
+    page.get_by_role("button", name="New experiment").click()
+    brought = page.get_by_role("radio", name="Another camera")
+    brought.check()
+    page.get_by_label("Name", exact=True).fill("n" * 200)
+    expect(page.locator("button.next")).to_have_text("Create the experiment")
+    page.reload()
+    expect(brought).to_be_checked()
+    page.locator("button.next", has_text="Create the experiment").click()
+    expect(page.locator("main")).to_have_attribute("aria-label", "Capture")
+    page.locator("nav").get_by_role("button", name="Rig").click()
+    page.get_by_role("button", name="New experiment").click()
+    # The experiment that is chosen stays chosen where a new one is entered.
+    page.get_by_role("radio", name=re.compile("packaged room")).check()
+    page.reload()
+    expect(page.get_by_role("radio", name=re.compile("packaged room"))).to_be_checked()
+
+
+def test_what_a_supply_brings_is_never_made_up(station: Station, opens: Opens):
+    page = chosen(station, opens).page
+    supply = page.get_by_role("group", name="supply 1").first
+    way = supply.get_by_label("Measured as")
+    flow = supply.get_by_label("Flow", exact=True)
+    way.select_option("flow")
+    flow.fill("250")
+    expect(page.locator("main")).to_contain_text("Supply 1: 250 m³/h, 0.58 m/s")
+    way.select_option("mean speed")
+    expect(supply.get_by_role("textbox", name="Mean speed")).to_have_value("0.579 m/s")
+    way.select_option("flow")
+    flow.fill("250")
+    air = page.get_by_label("Still air, at the reference")
+    air.fill("abc")
+    expect(air).to_have_attribute("aria-invalid", "true")
+    # While something else is wrong nobody knows the one from the other.
+    way.select_option("mean speed")
+    expect(supply.get_by_role("textbox", name="Mean speed")).to_have_value("")
+    way.select_option("flow")
+    expect(flow).to_have_value("")
+    page.get_by_role("button", name="Undo").click()
+    page.get_by_role("button", name="Undo").click()
+    expect(flow).to_have_value("250 m3/h")
+
+
+def test_who_leaves_a_room_as_somebody_else_made_it_goes_on_from_there(station: Station, opens: Opens):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        sent = next(one for one in client.templates() if one.template == "sample").answers
+        name = client.create_from_answers({**sent, "title": "Shared"}).experiment
+        page = opens(station.address).page
+        page.get_by_role("button", name="Edit room").click()
+        air = page.get_by_label("Still air, at the reference")
+        warmth = page.get_by_role("group", name="supply 1").first.get_by_label("Temperature", exact=True)
+        expect(warmth).to_have_value("30 C")
+        air.fill("21 C")
+        supply = {**client.answers(name).answers["supply"][0], "temperature": "31 C"}
+        client.change_answers(name, {**client.answers(name).answers, "supply": [supply]})
+        change = page.locator("button.next", has_text="Change the room")
+        change.click()
+        told = page.get_by_role("alert").get_by_role("row")
+        # The heading, and what differs: in the form's words, without what is alike.
+        expect(told).to_have_count(3)
+        expect(told.filter(has_text="still air")).to_contain_text(re.compile(r"20 C\s*21 C"))
+        expect(told.filter(has_text="supply 1, temperature")).to_contain_text(re.compile(r"31 C\s*30 C"))
+        snapshot(page, "conflict")
+        page.get_by_role("button", name="Leave it as it is").click()
+        expect(warmth).to_have_value("31 C")
+        expect(air).to_have_value("20 C")
+        air.fill("22 C")
+        change.click()
+        expect(page.locator("main")).to_have_attribute("aria-label", "Rig")
+        assert client.answers(name).answers["supply"][0]["temperature"] == "31 C"
+        assert client.answers(name).answers["air"] == "22 C"
+
+
 def test_a_person_comes_into_the_room_by_keyboard_alone(station: Station, opens: Opens):
     page = opens(station.address).page
 

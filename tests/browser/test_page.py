@@ -137,6 +137,57 @@ def test_the_page_goes_on_by_itself_after_the_service_was_restarted(station: Sta
     expect(page.get_by_role("row", name="back wall")).to_contain_text("plane through")
 
 
+def test_what_was_being_read_when_the_service_went_is_read_once_it_is_back(station: Station, opens: Opens):
+    page = opens(station.address).page
+    begin(station, page)
+    page.get_by_role("button", name="Look", exact=True).click()
+    painted = page.locator(".slice canvas").first
+    expect(painted).to_have_attribute("data-painted", re.compile(r"\d"))
+    # The editor's program is there already.
+    go(page, "Room")
+    page.get_by_role("button", name="Rig", exact=True).click()
+    footer, alert = page.locator("footer"), page.get_by_role("alert")
+    for there, is_back in (
+        ("Look", lambda: expect(painted).to_have_attribute("data-painted", re.compile(r"\d"))),
+        ("New", lambda: expect(page.get_by_role("radio", name=re.compile("packaged"))).to_be_visible()),
+        ("Room", lambda: expect(page.locator("button.next")).to_have_text("Change the room")),
+    ):
+        station.stop()
+        expect(footer).to_contain_text("service not reached")
+        if there == "Look":
+            page.get_by_role("button", name="Look", exact=True).click()
+        else:
+            button = {"New": "New experiment", "Room": "Edit room"}[there]
+            page.get_by_role("button", name=button, exact=True).click()
+        expect(alert).to_contain_text("The service does not answer")
+        station.start()
+        expect(footer).to_contain_text("service connected")
+        is_back()
+        expect(alert).to_have_count(0)
+        page.get_by_role("button", name="Rig", exact=True).click()
+
+
+def test_a_capture_is_taken_as_its_fields_say_and_is_discarded_by_two_clicks(station: Station, opens: Opens):
+    page = opens(station.address).page
+    page.locator("button.next").click()
+    page.locator("button.next", has_text="Calibrate").click()
+    page.get_by_role("button", name="Capture", exact=True).click()
+    frames = page.get_by_role("spinbutton", name="Frames to average")
+    frames.fill("3")
+    page.get_by_role("button", name="Rig", exact=True).click()
+    page.locator("button.next", has_text="Take the reference").click()
+    expect(frames).to_have_value("3")
+    taken = page.locator(".library li")
+    expect(taken).to_contain_text("3 frames")
+    page.get_by_role("button", name="Discard", exact=True).click()
+    page.get_by_role("button", name="Keep", exact=True).click()
+    page.get_by_role("button", name="Discard", exact=True).click()
+    snapshot(page, "discard")
+    expect(taken).to_contain_text("3 frames")
+    page.get_by_role("button", name="Discard for good").click()
+    expect(page.locator(".library")).to_contain_text("No captures yet.")
+
+
 def test_a_capture_goes_on_while_no_page_is_open(station: Station, opens: Opens):
     page = opens(station.address).page
     page.locator("button.next").click()

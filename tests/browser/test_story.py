@@ -34,7 +34,18 @@ def test_from_an_empty_bench_to_an_export(station: Station, opens: Opens):
     page.get_by_role("button", name="Reconstruct", exact=True).first.click()
     page.get_by_role("radio", name=re.compile("^draft")).check()
     next_step(page, "Reconstruct")
-    expect(page.locator(".growing canvas")).to_have_attribute("data-painted", "1")
+    growing = page.locator(".growing")
+    expect(growing.locator("canvas[aria-label]")).to_have_attribute("data-painted", "1")
+    expect(growing.locator(".bar")).to_contain_text(re.compile(r"K\s*above still air"))
+    # The bar's ends are the picture's coldest and warmest colour.
+    colours = """canvas => {
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      return Array.from({ length: data.length / 4 }, (_, n) => [...data.slice(4 * n, 4 * n + 3)]);
+    }"""
+    bar = growing.locator(".bar canvas").evaluate(colours)
+    painted = growing.locator("canvas[aria-label]").evaluate(colours)
+    assert bar[0] in painted
+    assert bar[-1] in painted
     snapshot(page, "4-reconstruct")
     next_step(page, "Look at the result")
     expect(page.locator(".slice canvas").first).to_have_attribute("data-painted", PAINTED)

@@ -68,8 +68,14 @@ def _validation(_request: Request, error: Exception) -> Response:
         FieldError(field=".".join(str(part) for part in item["loc"]), message=str(item["msg"]))
         for item in found[:20]
     ]
-    named = ", ".join(f"{item.field} ({item.message})" for item in errors[:3])
+    # Where a value was sent is told under `errors`; a reader knows it by its name.
+    named = ", ".join(f"{_bare(item.field)} ({item.message})" for item in errors[:3])
     return respond(ApiError("invalid", f"Not accepted: {named or 'the request'}.", errors=errors))
+
+
+def _bare(field: str) -> str:
+    place, _, name = field.partition(".")
+    return name if name and place in ("body", "query", "path", "header") else field
 
 
 def _bad_input(_request: Request, error: Exception) -> Response:

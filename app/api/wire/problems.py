@@ -44,7 +44,7 @@ KINDS: Mapping[str, Kind] = {
     ),
     "too_large": Kind(413, "The content is too large", "Send less, or a cropped or binned version."),
     "media_type_refused": Kind(415, "This kind of content is not accepted", "Send one of the kinds named."),
-    "invalid": Kind(422, "A value is not valid", "Correct the fields listed under `errors`."),
+    "invalid": Kind(422, "A value is not valid", "Correct the fields that are named, and send it again."),
     "content_refused": Kind(
         422, "The content cannot be used", "Check the file in the program that wrote it."
     ),

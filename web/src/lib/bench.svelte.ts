@@ -21,6 +21,8 @@ export type Page = (typeof PAGES)[number] | (typeof ASIDE)[number];
 
 // So many pixels across see the packaged room's 9.7 K in single windows; 384 would take 7400 frames.
 const SIMULATED_PX = 1536;
+// So many letters has the title of a job at most.
+const LONGEST = 200;
 // Fewer do not tell how they differ.
 export const LEAST_BURSTS = 3;
 const ACTIVE = ["queued", "running", "pausing", "cancelling", "lost"];
@@ -35,9 +37,28 @@ export interface Step {
   act: () => Promise<unknown>;
 }
 
+/** A part of an address; what is no address of this page stays as it is written. */
+function decoded(part: string): string {
+  try {
+    return decodeURIComponent(part);
+  } catch {
+    return part;
+  }
+}
+
+/** What is said of an address whose experiment is not there. */
+const missing = (experiment: string): Problem => ({
+  code: "not_found",
+  title: "Not found",
+  detail: `There is no experiment ${experiment}. Another one is shown; choose one above.`,
+  status: 404,
+});
+
 class Bench {
   page = $state<Page>("Rig");
   connected = $state(false);
+  /** How often the service came back: what could not be read while it was away is read again. */
+  returns = $state(0);
   experiments = $state.raw<ExperimentLine[]>([]);
   experiment = $state<string | null>(null);
   /** The cameras by their view's number; `camera` is the first view's. */
@@ -59,6 +80,9 @@ class Bench {
   preset = $state("auto");
   /** Whether each burst of a sequence is solved for as well. */
   everyBurst = $state(true);
+  /** What the next capture takes: frames of a picture, bursts of a flow and the time from one to the next, and whether
+      T of each is shown as it comes. */
+  wanted = $state({ frames: 100, bursts: 1, every_s: 6, live: false });
   /** Whether several cameras take their pictures at the same time. */
   atOnce = $state(false);
   /** What each running job says that it does. */
@@ -85,6 +109,7 @@ class Bench {
   /** The operator has chosen a page: the first answers no longer choose one. */
   private turned = false;
   private again: (() => Promise<unknown>) | null = null;
+  private leave: (() => Promise<unknown>) | null = null;
 
   /** The experiment that actions are about. */
   get here(): string {
@@ -119,7 +144,9 @@ class Bench {
     await this.attempt("Opening", async () => {
       await openSession();
       const named = this.read(location.hash);
+      const asked = this.experiment;
       await this.refresh();
+      if (asked && asked !== this.experiment) this.problem = missing(asked);
       if (!named && !this.turned && this.result) this.page = "Look";
       this.listen();
       this.opened = true;
@@ -146,13 +173,20 @@ class Bench {
     }
   }
 
-  /** Makes a change to what was read at `revision`. Where somebody else's came before, `settle` ends it. */
-  async change<T>(what: string, revision: string, send: (revision: string | null) => Promise<T>): Promise<void> {
+  /** Makes a change to what was read at `revision`. Where somebody else's came before, `settle` ends it; `leave`
+      reads anew what is there. */
+  async change<T>(
+    what: string,
+    revision: string,
+    send: (revision: string | null) => Promise<T>,
+    leave: (() => Promise<unknown>) | null = null,
+  ): Promise<void> {
     await this.attempt(what, async () => {
       try {
         await send(revision);
       } catch (error) {
-        if (error instanceof ProblemError && error.problem.code === "changed") this.again = () => send(null);
+        if (error instanceof ProblemError && error.problem.code === "changed")
+          [this.again, this.leave] = [() => send(null), leave];
         throw error;
       }
     });
@@ -160,10 +194,10 @@ class Bench {
 
   /** Sends the refused change again, to whatever is there, or leaves what is there. */
   async settle(again: boolean): Promise<void> {
-    const send = this.again;
-    [this.again, this.problem] = [null, null];
+    const settled = again ? this.again : this.leave;
+    [this.again, this.leave, this.problem] = [null, null, null];
     await this.attempt("Settling", async () => {
-      if (again && send) await send();
+      await settled?.();
       await this.refresh();
     });
   }
@@ -203,7 +237,6 @@ class Bench {
 
   /** Where the page is, as the part of its address after the #: page, experiment, and on Look the result. */
   get place(): string {
-    if (this.page === "New") return "#/new";
     const parts = [this.page.toLowerCase(), this.experiment, this.page === "Look" ? this.result : null];
     return `#/${parts.flatMap((part) => (part ? [encodeURIComponent(part)] : [])).join("/")}`;
   }
@@ -217,17 +250,22 @@ class Bench {
   async go(hash: string): Promise<void> {
     const before = this.experiment;
     this.read(hash);
-    if (this.experiment && this.experiment !== before) await this.choose(this.experiment, this.result);
+    if (!this.experiment || this.experiment === before) return;
+    if (this.experiments.some((one) => one.experiment === this.experiment))
+      return this.choose(this.experiment, this.result);
+    [this.problem, this.experiment, this.result] = [missing(this.experiment), before, null];
+    await this.attempt("Opening", () => this.refreshExperiment());
   }
 
   /** Whether the address names a page. */
   private read(hash: string): boolean {
-    const [page, experiment, result, view] = hash.replace(/^#\/?/, "").split("/").map(decodeURIComponent);
+    const [page, experiment, result, view] = hash.replace(/^#\/?/, "").split("/").map(decoded);
     const found = [...PAGES, ...ASIDE].find((one) => one.toLowerCase() === page);
     if (!found) return false;
     this.page = found;
+    // A result is one experiment's.
+    if (result || (experiment && experiment !== this.experiment)) this.result = result || null;
     if (experiment) this.experiment = experiment;
-    if (result) this.result = result;
     if (view) this.view = view;
     return true;
   }
@@ -282,9 +320,10 @@ class Bench {
   /** The operator's word that the experiment may open the devices that were just shown. */
   async confirmAddresses(): Promise<void> {
     const addresses = (this.problem?.current?.["addresses"] ?? []) as string[];
-    await this.attempt("Confirming", () =>
-      ask("PUT /experiments/{experiment}/addresses", { experiment: this.here }, { addresses }),
-    );
+    await this.attempt("Confirming", async () => {
+      await ask("PUT /experiments/{experiment}/addresses", { experiment: this.here }, { addresses });
+      this.done = `Confirmed: ${addresses.join(", ")}. Connect again`;
+    });
   }
 
   async disconnect(): Promise<void> {
@@ -311,8 +350,10 @@ class Bench {
     await this.refresh();
   }
 
-  async capture(role: NewCapture["role"], frames: number, more: Partial<NewCapture> = {}): Promise<void> {
-    const wanted = { role, frames, at_once: this.atOnce, ...more };
+  async capture(role: NewCapture["role"]): Promise<void> {
+    const { frames, bursts, every_s, live } = this.wanted;
+    const series = role === "flow" && bursts > 1 ? { bursts, every_s } : {};
+    const wanted = { role, frames, live, at_once: this.atOnce, ...series };
     this.desk = await ask("POST /experiments/{experiment}/captures", { experiment: this.here }, wanted);
   }
 
@@ -333,7 +374,7 @@ class Bench {
       {
         kind: "reconstruct",
         experiment: this.here,
-        title: `Reconstruct (${preset}): ${this.current?.title ?? this.experiment}`,
+        title: `Reconstruct (${preset}): ${this.current?.title || this.experiment}`.slice(0, LONGEST),
         settings: { preset, sequence: this.bursts >= LEAST_BURSTS && this.everyBurst },
         key: crypto.randomUUID(),
       },
@@ -396,8 +437,7 @@ class Bench {
       // A real rig, or one that was begun with, is calibrated by its operator: the guide says what to show.
       return step(`Calibrate the ${first}`, "Calibrate", nothing, this.page === "Calibrate");
     }
-    if (next === "reference" || next === "flow")
-      return step(`Take the ${next}`, "Capture", () => this.capture(next, 100));
+    if (next === "reference" || next === "flow") return step(`Take the ${next}`, "Capture", () => this.capture(next));
     if (job) {
       const share = job.steps ? `: ${Math.round(100 * job.progress)} %` : " …";
       return step(`${job.kind === "plan" ? "Planning" : "Reconstructing"}${share}`, "Reconstruct", nothing, true);
@@ -421,19 +461,21 @@ class Bench {
 
   // Events
 
-  private listen(): void {
+  private listen(away = false): void {
     const stream = new EventSource(address("GET /events", {}));
     const heard = (message: MessageEvent<string>) => this.hear(JSON.parse(message.data) as EventResource);
     for (const kind of ["job", "device", "capture", "calibration", "log", "experiment", "live"])
       stream.addEventListener(kind, heard);
     stream.onopen = () => {
       if (!this.connected) void this.later("all");
-      this.connected = true;
+      if (away) this.returns++;
+      if (this.problem?.code === "unreachable") this.problem = null;
+      [this.connected, away] = [true, false];
     };
     stream.onerror = () => {
-      this.connected = false;
+      [this.connected, away] = [false, true];
       // A refused stream is not tried again by the browser: a new token, or a proxy that gave up.
-      if (stream.readyState === EventSource.CLOSED) setTimeout(() => this.listen(), 2000);
+      if (stream.readyState === EventSource.CLOSED) setTimeout(() => this.listen(away), 2000);
     };
     this.stream = stream;
   }

@@ -1,6 +1,6 @@
 // Answers about a rig and its room while they are typed: every change can be undone, is kept in the browser until
 // the experiment is made, and is checked by the service.
-import { ask, ProblemError } from "./api";
+import { ask, ProblemError, type Problem } from "./api";
 import { bench } from "./bench.svelte";
 import type { CheckResource } from "./schema";
 
@@ -20,6 +20,7 @@ export const KINDS = [
 export type Kind = (typeof KINDS)[number];
 
 const KEPT = "answers";
+const BRINGS = "pictures are brought";
 const REST_MS = 250;
 const LENGTHS: Record<string, number> = { m: 1, cm: 0.01, mm: 0.001, ft: 0.3048, in: 0.0254 };
 
@@ -46,6 +47,10 @@ function at(tree: unknown, path: Path): unknown {
 class Draft {
   answers = $state.raw<Tree>({});
   check = $state.raw<CheckResource | null>(null);
+  /** The answers that `check` is about. */
+  private checked = $state.raw<Tree | null>(null);
+  /** Why they could not be checked. */
+  private refusal: Problem | null = null;
   /** The experiment whose room is edited; null for a new one. */
   experiment = $state<string | null>(null);
   revision = $state("");
@@ -59,6 +64,8 @@ class Draft {
   private timer: ReturnType<typeof setTimeout> | undefined;
   private asked = 0;
 
+  /** What the answers make, as they are now; null while that is not known. */
+  told = $derived(this.checked === this.answers ? (this.check?.told ?? null) : null);
   mistakes = $derived(new Map((this.check?.mistakes ?? []).map((one) => [one.field, one.sentence])));
 
   value(path: Path): unknown {
@@ -90,20 +97,29 @@ class Draft {
       } finally {
         bench.adding = null;
       }
-    } else this.answers = JSON.parse(localStorage.getItem(KEPT) ?? "{}") as Tree;
+    } else {
+      this.answers = JSON.parse(localStorage.getItem(KEPT) ?? "{}") as Tree;
+      bench.importing ||= localStorage.getItem(BRINGS) !== null;
+    }
     this.later();
   }
 
-  /** Sets one field; undefined removes it. Typing in one field is undone at once. */
+  /** Sets one field; undefined removes it, and empties one of several coordinates, so that the others keep their
+      places. Typing in one field is undone at once. */
   set(path: Path, value: unknown): void {
     const next = JSON.parse(JSON.stringify(this.answers)) as Tree;
     const parent = at(next, path.slice(0, -1)) as Tree | undefined;
     const key = path.at(-1);
     if (!parent || key === undefined) return;
     if (value !== undefined) parent[key] = value;
-    else if (Array.isArray(parent)) parent.splice(Number(key), 1);
+    else if (Array.isArray(parent)) parent[Number(key)] = "";
     else delete parent[key];
     this.put(next, fieldName(path));
+  }
+
+  /** Removes the thing at `index` of its kind; those behind it move up. */
+  remove(kind: Kind, index: number): void {
+    this.put({ ...this.answers, [kind]: this.items(kind).filter((_, number) => number !== index) });
   }
 
   add(kind: Kind, item: Tree): void {
@@ -135,22 +151,31 @@ class Draft {
     this.later();
   }
 
-  private later(): void {
-    if (!this.experiment) localStorage.setItem(KEPT, JSON.stringify(this.answers));
+  /** Checks the answers once typing rests. */
+  later(): void {
+    if (!this.experiment) {
+      localStorage.setItem(KEPT, JSON.stringify(this.answers));
+      if (bench.importing) localStorage.setItem(BRINGS, "yes");
+      else localStorage.removeItem(BRINGS);
+    }
     clearTimeout(this.timer);
     this.timer = setTimeout(() => void this.ask(), REST_MS);
   }
 
   private async ask(): Promise<void> {
-    const number = ++this.asked;
+    const [number, answers] = [++this.asked, this.answers];
     try {
-      const body = { answers: this.answers, experiment: this.experiment };
-      const found = await ask("POST /answers/check", {}, body);
+      const found = await ask("POST /answers/check", {}, { answers, experiment: this.experiment });
       // Only the newest question's answer counts.
-      if (number === this.asked) this.check = found;
+      if (number !== this.asked) return;
+      if (this.refusal && bench.problem === this.refusal) bench.problem = null;
+      [this.check, this.checked, this.refusal] = [found, answers, null];
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
-      bench.problem = error.problem;
+      if (number !== this.asked) return;
+      // What was checked before is not what is typed now.
+      this.check = null;
+      bench.problem = this.refusal = error.problem;
     }
   }
 
@@ -158,15 +183,18 @@ class Draft {
   async send(): Promise<void> {
     if (this.experiment) {
       const there = { experiment: this.experiment };
-      await bench.change("Changing the room", this.revision, async (revision) => {
+      const send = async (revision: string | null) => {
         const body = { answers: this.answers };
         const made = await ask("PUT /experiments/{experiment}/answers", there, body, revision);
         this.revision = made.revision;
         bench.page = bench.result ? "Look" : "Rig";
-      });
+      };
+      // Who leaves it as somebody else made it goes on from there.
+      await bench.change("Changing the room", this.revision, send, () => this.open(there.experiment));
     } else {
       const made = await ask("POST /experiments/from-answers", {}, { answers: this.answers });
       localStorage.removeItem(KEPT);
+      localStorage.removeItem(BRINGS);
       // Pictures that were taken elsewhere have no camera to connect.
       [bench.experiment, bench.page] = [made.experiment, bench.importing ? "Capture" : "Rig"];
       await bench.refresh();
