@@ -43,6 +43,13 @@ def test_a_job_that_could_only_fail_is_not_queued(airlens: Client):
     assert refused.value.problem.code == "bad_input"
 
 
+def test_a_value_that_is_none_is_named_as_its_sender_knows_it(live: Live):
+    with live.client() as http:
+        told = http.post("/api/jobs", json={"kind": "noise-study", "priority": "high"}).json()
+    assert told["cause"].startswith("Not accepted: priority (")
+    assert told["errors"][0]["field"] == "body.priority"
+
+
 def test_the_same_key_gives_the_same_job(airlens: Client):
     first = airlens.submit_job("noise-study", STUDY, key="a-key-of-mine")
     assert airlens.submit_job("noise-study", STUDY, key="a-key-of-mine").job == first.job
