@@ -84,8 +84,8 @@ def readings(experiment: Experiment, solution: Solution) -> list[Reading]:
 def left_thermometers(experiment: Experiment, solution: Solution) -> tuple[str, ...]:
     """Sentences on the thermometers whose reading the result leaves by more than both deviations together allow.
 
-    Where all are right, at most one result in twenty has such a sentence. The one that is farthest off is first: a wrong one
-    pulls the result away from others too. Raises BadInputError.
+    Where all are right, at most one result in twenty has such a sentence. The one that is farthest off is first: a
+    wrong one pulls the result away from others too. Raises BadInputError.
     """
     off = {
         one: abs(one.found - one.measured) / float(np.hypot(one.std, one.found_std))
