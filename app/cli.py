@@ -28,7 +28,7 @@ def create_cli() -> typer.Typer:
         help="See and measure the air in a room with one camera and one projector.",
         invoke_without_command=True,
         pretty_exceptions_enable=False,
-        rich_markup_mode=None,  # markup takes a unit in brackets for a style
+        rich_markup_mode="markdown",  # the other takes a unit in brackets for a style
     )
     cli.callback()(_airlens)
     return cli

@@ -25,7 +25,7 @@ class Deferred(TyperCommand):
 
 def commands_of(module: str) -> Mapping[str, Any]:
     """The commands that a module registers, by name."""
-    cli = typer.Typer(rich_markup_mode=None)
+    cli = typer.Typer(rich_markup_mode="markdown")
     cli.callback()(_nothing)
     importlib.import_module(module).register(cli)
     return typer.main.get_group(cli).commands

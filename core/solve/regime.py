@@ -207,6 +207,11 @@ def _usable(shift: ShiftMeasurement, data: DataModel) -> tuple[np.ndarray, float
     noise = np.sqrt(np.trace(np.linalg.inv(shift.information_per_px2), axis1=1, axis2=2))
     # First without windows that have no texture: beside the wall those give shifts of hundreds of pixels.
     textured = noise < 1.0
+    if not textured.any():
+        raise SettingError(
+            "No window of a picture knows its shift along both directions to a pixel, as where a pattern is of "
+            "stripes. Use a pattern with texture in both directions."
+        )
     seen = size[textured]
     typical = float(np.sqrt(np.mean(np.minimum(seen, np.percentile(seen, 90)) ** 2)))
     return textured & (size < data.outlier * typical + 6 * noise), data.representation * typical

@@ -89,8 +89,12 @@ def test_the_projector_alone_is_fitted_and_goes_where_its_camera_goes(folder):
     std_m = np.sqrt(np.diag(lamp.covariance_matrix() + eye.covariance_matrix()))[12:]
     assert np.abs(apart_m - (0.3, 0.0, 0.0)).max() < 5 * std_m.max() < 0.3
     assert "second" not in [name for part in parts_of(open_experiment(folder)) for name in part.lacking]
+    # So it stands where the scene says, with the lens that was found.
+    stated = open_experiment(folder).settings.scene.views[1].light.projector
     lights = [view.light for view in known_of(open_experiment(folder)).scene.views]
-    assert lights[1].projector == lamp.optics
+    assert lights[1].projector == replace(
+        lamp.optics, position_m=stated.position_m, rotation_rad=stated.rotation_rad
+    )
     model = measured_model(calibration, "second")
     assert isinstance(model, FurtherProjector)
     assert len(figures(model, bundle.of("second", False))) == 1

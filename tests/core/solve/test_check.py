@@ -51,8 +51,6 @@ def test_a_sound_problem_passes():
         ({"displacement_px": np.full((2, 2), np.nan)}, "saturated"),
         ({"information_per_px2": np.full((2, 2, 2), np.eye(2) * 1e18)}, "noise is zero"),
         ({"information_per_px2": np.zeros((2, 2, 2))}, "no window with texture"),
-        # Stripes: pictures know the shift across them, and along them next to nothing.
-        ({"information_per_px2": np.full((2, 2, 2), np.diag([1e6, 1e-6]))}, "no window with texture"),
         (
             {
                 "centres_px": np.zeros((0, 2)),
@@ -145,3 +143,11 @@ def test_a_regime_is_a_list_of_losses():
 def test_a_grid_that_cannot_be_halved_is_refused():
     with pytest.raises(SettingError, match="power of two"):
         GridSettings(cells=48, coarsest=32)
+
+
+def test_stripes_are_refused_by_what_marches_no_room():
+    across = np.broadcast_to(np.diag([1e6, 1e-6]), (2, 2, 2)).copy()
+    striped = problem(information_per_px2=across)
+    check_problem(striped, "bos+pde+boundary")
+    with pytest.raises(SettingError, match="texture in both directions"):
+        losses_of(striped, frame_of(striped), "bos+boundary", Weights(), DataModel(), (5, 5, 5), 9)
