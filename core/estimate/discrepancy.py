@@ -4,11 +4,13 @@
 
 Linear least squares on the last residual. The first sum is an error of the profile over height, which holds that of
 the level (the mean). The second has one part for each axis a that a view looks along, and is constant along it, since
-a view sees only means along its rays: a view of y_max tells b_i(x) b_j(z), one of x_max b_i(y) b_j(z).
-Images do not see the level; thermometers do (a plane, outlets, sensors). A plane on a wall
-of unknown temperature lies in that wall's thermal layer, which the model may have wrong by one constant: that
-constant is estimated too. Walls of stated temperature keep it. The errors that the windows of a picture share, such
-as what the camera may have done, are marginalised. The velocity is not corrected.
+a view sees only means along its rays: a view of y_max tells b_i(x) b_j(z), one of x_max b_i(y) b_j(z). K is the
+covariance of the coefficients: what is near one another is wrong alike, and parts are independent.
+
+Images do not see the level; thermometers do (a plane, outlets, sensors). A plane on a wall of unknown temperature
+lies in that wall's thermal layer, which the model may have wrong by one constant: that constant is estimated too.
+Walls of stated temperature keep it. The errors that the windows of a picture share, such as what the camera may have
+done, are marginalised. The velocity is not corrected.
 
 How large the correction may be follows from the residual itself, by its marginal likelihood: a room that the data
 contradict is corrected further, and is less certain, than one that they confirm. The error of images and planes

@@ -265,8 +265,8 @@ def _with_inlet(plane: WallPlane, layout: RoomLayout, n: int, parameters: RoomPa
     first, second = (a for a in AXES if a != opening.axis)
     normal = velocity[opening.axis]
     flow_m_s = plane.normal_m_s + normal * fraction
-    # A face in part of the supply, or of several, carries their momentum by a mean speed that has less of it.
-    carried = normal**2 * fraction - (flow_m_s**2 - plane.normal_m_s**2)
+    # A face that is covered in part, or by several supplies, has their mean speed, which carries less momentum.
+    missing = normal**2 * fraction - (flow_m_s**2 - plane.normal_m_s**2)
     # Where two supplies share a face, what they bring is mixed as they flow.
     share = jnp.where(inside, normal * fraction / jnp.where(flow_m_s == 0.0, 1.0, flow_m_s), 0.0)
     # Speed scales k by its square and epsilon by its cube.
@@ -280,7 +280,7 @@ def _with_inlet(plane: WallPlane, layout: RoomLayout, n: int, parameters: RoomPa
         flow_m_s,
         (put(plane.tangent_m_s[0], velocity[first]), put(plane.tangent_m_s[1], velocity[second])),
         put(plane.inflow_excess_k, parameters.inlet_excess_k[n]),
-        plane.force_m_s2 + opening.inward * carried / layout.grid.spacing_m[opening.axis],
+        plane.force_m_s2 + opening.inward * missing / layout.grid.spacing_m[opening.axis],
         plane.conductance_m_s,
         plane.wall_excess_k,
         put(plane.turbulent_energy_m2_s2, k * gain**2),
