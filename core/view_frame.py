@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from core.fields import AbstractField, Components, GridField
-from core.geometry import Box, Optics, Vector3, WallName, face_of, rotation_vector
+from core.geometry import WALLS, Box, Optics, Vector3, WallName, face_of, rotation_vector
 from core.objects import RoomObject
-from core.scene import Light, ProjectedPattern, Scene
+from core.scene import Light, ProjectedPattern, Scene, View
 
 # Rows: the frame's axes in the room, as signed axis numbers from 1. Each is a rotation.
 _ROWS: dict[WallName, tuple[int, int, int]] = {
@@ -158,6 +158,17 @@ def field_facing(field: AbstractField, turn: Turn) -> AbstractField:
 def looked_along(scene: Scene) -> tuple[int, ...]:
     """The axes that views look along, each once, in the order x, y, z."""
     return tuple(sorted({face_of(view.wall).axis for view in scene.views}))
+
+
+def passed_walls(view: View, room: Box) -> frozenset[WallName]:
+    """The walls whose layers of air bend a view's rays: the one that it looks at, and the one that it looks through.
+
+    A camera that stands in the room looks through none.
+    """
+    through = WALLS[face_of(view.wall).number ^ 1]
+    front = face_of(through)
+    inside = (view.camera.position_m[front.axis] - front.place_m(room)) * front.inward >= 0.0
+    return frozenset({view.wall} if inside else {view.wall, through})
 
 
 def told_on_floor(scene: Scene) -> tuple[int, ...]:

@@ -29,7 +29,7 @@ from core.room.boundary_conditions import RoomLayout, RoomParameters, SuspectedH
 from core.room.forward import closure_name
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.scene import Heater, Inlet, Scene
-from core.view_frame import looked_along
+from core.view_frame import passed_walls
 
 # Walls' heat coefficients are known within a factor of two: one sigma is 0.6 in the logarithm.
 _WALL_HEAT_STD = 0.6
@@ -198,9 +198,13 @@ def room_prior(
 
 
 def looked_through(scene: Scene) -> tuple[WallName, WallName] | None:
-    """The two walls at the ends of the only axis that cameras look along; None where they look along several."""
-    axes = looked_along(scene)
-    return (WALLS[2 * axes[0]], WALLS[2 * axes[0] + 1]) if len(axes) == 1 else None
+    """The two walls that every ray passes; None where cameras look along several axes, or one stands in the room."""
+    first, *others = (passed_walls(view, scene.room) for view in scene.views)
+    both = first.intersection(*others)
+    if len(both) < 2:
+        return None
+    low, high = sorted(both, key=WALLS.index)
+    return low, high
 
 
 def object_means(scene: Scene) -> tuple[Array, Array, Array]:

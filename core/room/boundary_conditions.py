@@ -21,7 +21,7 @@ from core.room.wall_planes import Boundary, WallPlane, closed_wall
 from core.scene import Heater, Inlet, OnPatch, Outlet, Scene
 from core.setting import SettingError
 from core.significance import EITHER_WAY
-from core.view_frame import looked_along
+from core.view_frame import passed_walls
 
 
 class SuspectedHeater(Heater):
@@ -143,7 +143,8 @@ def _in_sight(scene: Scene) -> Float[np.ndarray, "6"]:
 
     Beside the others the pictures are left out (`core.data_error.WALL_MARGIN`), so nothing tells such a temperature.
     """
-    return np.array([float(wall // 2 in looked_along(scene)) for wall in range(6)])
+    passed = [passed_walls(view, scene.room) for view in scene.views]
+    return np.array([float(any(name in walls for walls in passed)) for name in WALLS])
 
 
 def boundary(layout: RoomLayout, parameters: RoomParameters) -> Boundary:

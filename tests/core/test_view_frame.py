@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from core.estimate.prior import looked_through
 from core.fields import FunctionField, GridField
 from core.geometry import WALLS, Box, WallName, face_of, looking_along_y
 from core.objects import RoomObject
@@ -14,7 +15,7 @@ from core.rays.visibility import sees_wall, wall_points
 from core.render import render_flow, render_reference
 from core.scene import FixedTexture, ProjectedPattern, Scene, View
 from core.setting import SettingError
-from core.view_frame import TurnedField, facing, field_facing, looked_along, turn_to
+from core.view_frame import TurnedField, facing, field_facing, looked_along, passed_walls, turn_to
 
 SHAPE = (9, 7, 8)
 CAMERA = looking_along_y(position_m=(1.0, -2.0, 0.75), width_px=64, height_px=48, focal_px=120.0)
@@ -123,6 +124,18 @@ def test_the_axes_that_views_look_along():
         (0, 1, 2),
         (0, 1, 2),
     ]
+
+
+def test_the_walls_that_rays_pass():
+    """Both ends of the axis that is looked along, unless the camera stands in the room."""
+    side = elsewhere(AHEAD, "x_min")
+    assert passed_walls(AHEAD.views[0], AHEAD.room) == {"y_min", "y_max"}
+    assert passed_walls(side.views[0], side.room) == {"x_min", "x_max"}
+    assert (looked_through(AHEAD), looked_through(side)) == (("y_min", "y_max"), ("x_min", "x_max"))
+
+    inside = replace(AHEAD.views[0], camera=replace(CAMERA, position_m=(1.0, 0.1, 0.75)))
+    assert passed_walls(inside, AHEAD.room) == {"y_max"}
+    assert looked_through(replace(AHEAD, views=(inside,))) is None
 
 
 def test_views_that_cannot_be_are_refused_by_name():

@@ -15,7 +15,7 @@ from core.scene import Scene
 from core.solve.check import check_problem
 from core.solve.draft.conjugate_gradients import Volume
 from core.solve.draft.temperature import solve_temperature
-from core.solve.draft.temperature_prior import TemperatureSettings
+from core.solve.draft.temperature_prior import TemperatureSettings, thinned
 from core.view_frame import looked_along
 from core.watch import Watch
 
@@ -65,7 +65,7 @@ def draft_grid(scene: Scene) -> VertexGrid:
     counts = [int(np.clip(round(s / spacing), 8, longest)) + 1 for s in size]
     unseen = looked_along(scene)
     if len(unseen) == 1:
-        counts[unseen[0]] = max(9, (counts[unseen[0]] + 2) // 3)
+        counts[unseen[0]] = thinned(counts[unseen[0]])
     return VertexGrid(scene.room, (counts[0], counts[1], counts[2]))
 
 

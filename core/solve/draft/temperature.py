@@ -5,11 +5,12 @@ Unknown is the excess refractivity n on a vertex grid, in which the data are lin
     1/2 sum_w (A n - d)^T W (A n - d)                        the shifts, noise and representation error
   + 1/2 sum_v (n - n_known)^2 / std^2                        planes
   + 1/2 sum_m (mean_m n - n_mean)^2 / std^2                  outlets, sensors
-  + 1/2 int (n'^2 + lx^2 (dx n')^2 + ly^2 (dy n')^2 + lz^2 (dz n')^2) / s^2      n' = n - prior
+  + 1/2 sum_a int (na^2 + lx^2 (dx na)^2 + ly^2 (dy na)^2 + lz^2 (dz na)^2) / sa^2      sum_a na = n - prior
 
-One view sees integrals along its rays: across them the data decide, along them the prior (smooth: ly is
-long) and the known planes do. Where no plane gives the profile over height, n' is the departure from a
-profile of its own, which costs only (Dz profile)^2 / step^2: pictures do not see the level, so nothing but
+One view sees integrals along its rays: across them the data decide, along them the prior (smooth: of the part na
+that a view along a tells, la is long) and the known planes do. Views along several axes each have a part, with a
+size of its own (`temperature_prior`). Where no plane gives the profile over height, the parts are the departure from
+a profile of its own, which costs only (Dz profile)^2 / step^2: pictures do not see the level, so nothing but
 thermometers may hold it.
 
 Cost: conjugate gradients, two operator products an iteration; a few solves more for the deviations. Error:
@@ -40,9 +41,8 @@ from core.solve.draft.temperature_prior import (
     TemperatureSettings,
     data_weight,
     excess,
-    lengths_m,
     level_k,
-    prior_size,
+    prior_parts,
     prior_temperature,
     profile_range_k,
     profile_weight,
@@ -55,7 +55,6 @@ from core.solve.draft.temperature_system import (
     steepest_slopes,
     without_shared_errors,
 )
-from core.view_frame import looked_along
 from core.watch import Row, Watch
 
 # The hottest air that a step may reach: its refractivity is nearly zero, and a step further would make it negative.
@@ -174,23 +173,18 @@ def _system(
     layers_px = front_layers_px(problem, rays, grid, per_k)
     still = [without_shared_errors(*of) for of in zip(rays, problem.shifts, weights, layers_px, strict=True)]
     operators, shifts = tuple(operator for operator, _ in still), tuple(shift for _, shift in still)
-    lengths = lengths_m(grid, settings, looked_along(problem.scene))
-    size = prior_size(operators, weights, shifts, prior, grid, lengths)
-    # A room's worth of independent values: one a hundred vertices.
-    mass = 0.01 / size**2
-    stiff = [mass * (length / h) ** 2 for length, h in zip(lengths, grid.spacing_m, strict=True)]
+    along = tuple(face_of(view.wall).axis for view in problem.scene.views[: len(operators)])
     system = System(
         grid,
         operators,
-        tuple(face_of(view.wall).axis for view in problem.scene.views[: len(operators)]),
+        along,
         rays,
         weights,
         known,
         per_k,
-        stiffness=(stiff[0], stiff[1], stiff[2]),
-        mass=mass,
-        slopes=steepest_slopes(problem.scene),
-        profile=None if problem.planes else profile_weight(per_k * profile_range_k(problem), grid),
+        prior_parts(operators, along, weights, shifts, prior, grid, settings),
+        steepest_slopes(problem.scene),
+        None if problem.planes else profile_weight(per_k * profile_range_k(problem), grid),
     )
     return system, prior, shifts
 

@@ -9,9 +9,10 @@ from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
+from scipy.fft import idctn
 from scipy.ndimage import gaussian_filter
 
-from core.solve.draft.temperature_system import System, Volume, slopes_back
+from core.solve.draft.temperature_system import System, Volume
 
 _SMOOTH_VERTICES = 1.5
 
@@ -39,16 +40,5 @@ def _perturbation(system: System, random: np.random.Generator) -> Volume:
     total[known.mask] += random.standard_normal(count) / (known.std_k[known.mask] * system.per_k)
     for members, _, std in known.means:
         total.reshape(-1)[members] += random.standard_normal() / (len(members) * std * system.per_k)
-    return total + _prior_perturbation(system, random)
-
-
-def _prior_perturbation(system: System, random: np.random.Generator) -> Volume:
-    """The same of the prior's terms."""
-    shape = system.grid.shape
-    total = system.mass**0.5 * random.standard_normal(shape)
-    for axis, factor in enumerate(system.stiffness):
-        total += factor**0.5 * slopes_back(random, shape, axis)
-    if system.profile is None:
-        return total
-    level = slopes_back(random, (1, 1, shape[2]), 2) * (system.profile**0.5 / (shape[0] * shape[1]))
-    return total - total.mean((0, 1), keepdims=True) + level
+    prior = np.sqrt(system.precision) * random.standard_normal(shape)
+    return np.asarray(total + np.asarray(idctn(prior, norm="ortho")))

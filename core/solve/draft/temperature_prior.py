@@ -1,14 +1,18 @@
 """The prior of `draft`, and the weights of its windows.
 
 The prior mean is the known plane's profile over height, the same in the whole room. Without a plane the thermometers
-give the level, and the profile is free within the range of the air that is known. The prior's size is the one at
-which smooth random fields move the pattern as far as it has moved (moment matching). So a cool room gets a small
-prior, and broad fields, which a projector beside the camera hardly sees, stay near the prior.
+give the level, and the profile is free within the range of the air that is known.
+
+Departures from that are the sum of independent parts, one for each axis that views look along: a part varies slowly
+along its axis. The sizes of the parts are those at which smooth random fields move each view's pattern as far as it
+has moved (moment matching). So a cool room gets a small prior, broad fields, which a projector beside the camera
+hardly sees, stay near the prior, and what one view sees of a jet does not make the others take noise for air.
 """
 
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter
+from scipy.optimize import nnls
 
 from core.air import Air
 from core.data_error import CORRELATED_DATA, REPRESENTATION
@@ -17,7 +21,7 @@ from core.known_temperature import KnownTemperature, VertexGrid, known_temperatu
 from core.problem import Problem, ShiftMeasurement
 from core.scene import Heater, Inlet, Outlet
 from core.setting import setting
-from core.solve.draft.temperature_system import ShiftOperator, Volume
+from core.solve.draft.temperature_system import Part, ShiftOperator, Volume
 
 # A thousandth of a kelvin, as excess refractivity.
 _LEAST_SIZE = 1e-9
@@ -25,6 +29,7 @@ _LEAST_RANGE_K = 0.1
 # A profile rises by something between nothing and the range of the air that is known: the mean and deviation of that.
 _RISE, RISE_STD = 0.5, 12**-0.5
 _DRAWS = 4
+_TINY = float(np.finfo(float).tiny)
 
 
 @setting
@@ -104,32 +109,70 @@ def profile_range_k(problem: Problem) -> float:
     return max(max(kelvin) - min(kelvin), _LEAST_RANGE_K)
 
 
-def prior_size(
+def thinned(count: int) -> int:
+    """So many vertices are enough, of as many across, along an axis along which the air varies slowly."""
+    return max(9, (count + 2) // 3)
+
+
+def prior_parts(
+    operators: tuple[ShiftOperator, ...],
+    along: tuple[int, ...],
+    weights: tuple[Float[np.ndarray, "_ 2 2"], ...],
+    shifts: tuple[ShiftMeasurement, ...],
+    prior: Volume,
+    grid: VertexGrid,
+    settings: TemperatureSettings,
+) -> tuple[Part, ...]:
+    """The parts of n - prior, one for each axis that views look along; `along` is each view's.
+
+    A part's size is that at which it moves its views' patterns as far as they moved beyond their noise, and beyond
+    what the other parts move them.
+    """
+    axes = sorted(set(along))
+    lengths = [lengths_m(grid, settings, axis) for axis in axes]
+    beyond, noise, moved = _powers(operators, weights, shifts, prior, grid, lengths)
+    squares, _ = nnls(moved / noise[:, None], beyond / noise)
+    parts = []
+    for number, (axis, reach) in enumerate(zip(axes, lengths, strict=True)):
+        own = np.array(along) == axis
+        # At least a tenth of what noise alone gives: a size of zero would forbid every departure.
+        least = 0.01 * noise[own].sum() / max(moved[own, number].sum(), _TINY)
+        square = max(squares[number], least, _LEAST_SIZE**2)
+        # A room's worth of independent values: one a hundred vertices, of a grid that is thinned along the view.
+        fewer = 1.0 if len(axes) == 1 else thinned(grid.shape[axis]) / grid.shape[axis]
+        mass = 0.01 * fewer / square
+        x, y, z = (mass * (length / h) ** 2 for length, h in zip(reach, grid.spacing_m, strict=True))
+        parts.append(Part(mass, (x, y, z)))
+    return tuple(parts)
+
+
+def _powers(
     operators: tuple[ShiftOperator, ...],
     weights: tuple[Float[np.ndarray, "_ 2 2"], ...],
     shifts: tuple[ShiftMeasurement, ...],
     prior: Volume,
     grid: VertexGrid,
-    lengths: tuple[float, float, float],
-) -> float:
-    """Rms of n - prior at which smooth random fields move the pattern as far as it moved beyond its noise."""
+    lengths: list[tuple[float, float, float]],
+) -> tuple[Float[np.ndarray, " views"], Float[np.ndarray, " views"], Float[np.ndarray, "views parts"]]:
+    """Of each view's shifts: what they have beyond noise, their noise, and what a part of size 1 adds."""
     random = np.random.default_rng(0)
-    sigma = [length / h for length, h in zip(lengths, grid.spacing_m, strict=True)]
-    unit, seen, noise = 0.0, 0.0, 0.0
-    draws = [
-        gaussian_filter(random.standard_normal(grid.shape), sigma, mode="reflect") for _ in range(_DRAWS)
-    ]
+    parts = []
+    for reach in lengths:
+        sigma = [length / h for length, h in zip(reach, grid.spacing_m, strict=True)]
+        draws = [
+            gaussian_filter(random.standard_normal(grid.shape), sigma, mode="reflect") for _ in range(_DRAWS)
+        ]
+        parts.append([draw / draw.std() for draw in draws])
+    rows = []
     for operator, weight, shift in zip(operators, weights, shifts, strict=True):
         used = weight[:, 0, 0] > 0
         spread = np.linalg.cholesky(np.linalg.inv(shift.information_per_px2[used]))
-        drawn = np.einsum("wab,wb->wa", spread, random.standard_normal((used.sum(), 2)))
-        noise += _most(drawn)
-        seen += _most((shift.displacement_px - operator.apply(prior))[used])
-        unit += float(np.mean([_most(operator.apply(d / d.std())[used]) for d in draws]))
-    if unit == 0.0:
-        return _LEAST_SIZE
-    # At least a tenth of what noise alone gives: a size of zero would forbid every departure.
-    return max(float(np.sqrt(max(seen - noise, 0.01 * noise) / unit)), _LEAST_SIZE)
+        noise = _most(np.einsum("wab,wb->wa", spread, random.standard_normal((used.sum(), 2))))
+        seen = _most((shift.displacement_px - operator.apply(prior))[used])
+        moved = [np.mean([_most(operator.apply(draw)[used]) for draw in draws]) for draws in parts]
+        rows.append([seen - noise, max(noise, _TINY), *moved])
+    beyond, noises, *of_parts = np.array(rows).T
+    return beyond, noises, np.stack(of_parts, axis=1)
 
 
 def _most(shifts_px: Float[np.ndarray, "windows 2"]) -> float:
@@ -138,13 +181,11 @@ def _most(shifts_px: Float[np.ndarray, "windows 2"]) -> float:
     return float(squares[squares <= np.percentile(squares, 90)].sum()) if len(squares) else 0.0
 
 
-def lengths_m(
-    grid: VertexGrid, settings: TemperatureSettings, looked_along: tuple[int, ...]
-) -> tuple[float, float, float]:
-    """Correlation lengths of n' along x, y, z [m]: long where all views look along the axis, and none across it."""
+def lengths_m(grid: VertexGrid, settings: TemperatureSettings, along: int) -> tuple[float, float, float]:
+    """Correlation lengths along x, y, z [m] of a part: long along the axis that is looked along."""
     longest_m = max(grid.box.size_m)
-    shares = [settings.along if looked_along == (axis,) else settings.across for axis in range(3)]
-    return shares[0] * longest_m, shares[1] * longest_m, shares[2] * longest_m
+    x, y, z = (longest_m * (settings.along if axis == along else settings.across) for axis in range(3))
+    return x, y, z
 
 
 def excess(air: Air, excess_k: np.ndarray) -> np.ndarray:

@@ -1,14 +1,16 @@
 """The quadratic problem of `draft` in the excess refractivity n, flattened: its Hessian and a preconditioner.
 
-Conjugate gradients cost two operator products an iteration; the preconditioner is the smoothness term and the
-mean data term, which are diagonal under the cosine transform.
+Conjugate gradients cost two operator products an iteration; the preconditioner is the prior and the mean data term,
+which are diagonal under the cosine transform.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
+from scipy.fft import dct, dctn, idctn
 
 from core.geometry import face_of
 from core.known_temperature import KnownTemperature, VertexGrid
@@ -37,6 +39,17 @@ class ShiftOperator(Protocol):
 
 
 @dataclass(frozen=True)
+class Part:
+    """Air that varies slowly along the axis that a view looks along: what n costs at a vertex, and its steps.
+
+    `stiffness` is the weight of the square of a step from one vertex to the next, along x, y and z.
+    """
+
+    mass: float
+    stiffness: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
 class System:
     """The quadratic problem in n, flattened."""
 
@@ -49,8 +62,8 @@ class System:
     weights: tuple[Float[np.ndarray, "_ 2 2"], ...]
     known: KnownTemperature
     per_k: float
-    stiffness: tuple[float, float, float]
-    mass: float
+    # n is the sum of these, which are independent: one for each axis that a view looks along.
+    parts: tuple[Part, ...]
     slopes: Slopes
     # Where no plane gives the profile over height: how much a step of it from one level to the next weighs.
     profile: float | None
@@ -59,17 +72,32 @@ class System:
         """The same with windows that count `times` fewer."""
         return replace(self, weights=tuple(weight / times for weight in self.weights))
 
+    @cached_property
+    def precision(self) -> Volume:
+        """What the prior weighs on each wave of the cosine transform along x, y and z."""
+        x, y, z = (_curvatures(count) for count in self.grid.shape)
+        return self.precision_of(x, y, z)
+
+    def precision_of(
+        self, x: Float[np.ndarray, " nx"], y: Float[np.ndarray, " ny"], z: Float[np.ndarray, " nz"]
+    ) -> Volume:
+        """The same of waves with these second differences; the first along x and y are even."""
+        variance = np.zeros((len(x), len(y), len(z)))
+        for part in self.parts:
+            fx, fy, fz = part.stiffness
+            variance += 1 / (part.mass + fx * x[:, None, None] + fy * y[None, :, None] + fz * z[None, None])
+        precision = 1 / variance
+        if self.profile is not None:
+            precision[0, 0] = self.profile / (len(x) * len(y)) * z
+        return precision
+
     def smooth(self, n: Volume) -> Volume:
         """Gradient of the prior's terms: size and smoothness, of departures from a profile that is free."""
-        total = np.zeros_like(n)
-        if self.profile is not None:
-            level = n.mean((0, 1), keepdims=True)
-            n = n - level
-            total += _second_differences(level, 2) * (self.profile / (n.shape[0] * n.shape[1]))
-        total += self.mass * n
-        for axis, factor in enumerate(self.stiffness):
-            total += factor * _second_differences(n, axis)
-        return total
+        return np.asarray(idctn(self.precision * dctn(n, norm="ortho"), norm="ortho"))
+
+    def stiffness(self, axis: int) -> float:
+        """What the parts together weigh on steep steps along an axis."""
+        return 1 / sum(1 / part.stiffness[axis] for part in self.parts)
 
     def known_terms(self, n: Volume) -> Volume:
         """Hessian of the known values and means, times n."""
@@ -133,15 +161,14 @@ def preconditioner(system: System) -> Product:
     diagonal of W in the modes counts. Known planes pin their wall.
     """
     shape, spacing = system.grid.shape, system.grid.spacing_m
-    fx, fy, fz = system.stiffness
     (lx, qx, dx), (lz, qz, dz) = (_modes(system, axis) for axis in (0, 2))
     levers = _slab_levers(system, 1)
-    smooth = fx * lx[:, None] + fz * lz[None]
     across = dx[:, None] / spacing[0] ** 2 + dz[None] / spacing[2] ** 2
+    waves = np.asarray(dct(np.eye(shape[1]), axis=0, norm="ortho"))
+    precision = system.precision_of(lx, _curvatures(shape[1]), lz).transpose(0, 2, 1)
     matrices = (
-        (smooth[..., None, None] + system.mass) * np.eye(shape[1])
+        (waves.T * precision[..., None, :]) @ waves
         + _mean_mass(system) * np.eye(shape[1])
-        + fy * _laplacian(shape[1])
         + across[..., None, None] * levers * _coherence(system)
     )
     for axis in {0, 2} & set(system.looks_along):
@@ -150,10 +177,6 @@ def preconditioner(system: System) -> Product:
         seen = _levers_of_modes(system, axis, qx if axis == 0 else qz)
         matrices += (seen * curvature)[..., None, None] * np.eye(shape[1])
         matrices += seen[..., None, None] * _laplacian(shape[1]) / spacing[1] ** 2
-    if system.profile is not None:
-        # The first mode along x, where it is even along y, is the profile.
-        weights = system.profile / (shape[0] * shape[1]) * lz - smooth[0] - system.mass
-        matrices[0] += weights[:, None, None] * np.full((shape[1], shape[1]), 1 / shape[1])
     inverses = np.linalg.inv(matrices)
 
     across_x, across_z = np.ascontiguousarray(qx.T), np.ascontiguousarray(qz.T)
@@ -167,21 +190,9 @@ def preconditioner(system: System) -> Product:
     return apply
 
 
-def _second_differences(n: Volume, axis: int) -> Volume:
-    """Dᵀ D n along an axis with free ends."""
-    total = np.zeros_like(n)
-    difference = np.diff(n, axis=axis)
-    low, high = [slice(None)] * 3, [slice(None)] * 3
-    low[axis], high[axis] = slice(None, -1), slice(1, None)
-    total[tuple(low)] -= difference
-    total[tuple(high)] += difference
-    return total
-
-
-def slopes_back(random: np.random.Generator, shape: tuple[int, int, int], axis: int) -> Volume:
-    """Dᵀ of white noise between the vertices along an axis."""
-    noise = random.standard_normal([n - 1 if a == axis else n for a, n in enumerate(shape)])
-    return -np.diff(noise, axis=axis, prepend=0.0, append=0.0)
+def _curvatures(count: int) -> Float[np.ndarray, " waves"]:
+    """Second differences of each wave of the cosine transform along a line with free ends, over the wave itself."""
+    return np.asarray(2.0 - 2.0 * np.cos(np.pi * np.arange(count) / count))
 
 
 def _mean_mass(system: System) -> float:
@@ -246,7 +257,7 @@ def _modes(
     for end in (0, -1):
         if mask[end].mean() > 0.5:
             weight = np.mean(1 / (std[end][mask[end]] * system.per_k) ** 2)
-            pinned[end, end] += weight / system.stiffness[axis]
+            pinned[end, end] += weight / system.stiffness(axis)
     values, vectors = np.linalg.eigh(pinned)
     return values, vectors, np.einsum("ai,ab,bi->i", vectors, laplacian, vectors)
 

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from core.geometry import Box, looking_along_y
-from core.known_temperature import VertexGrid
+from core.known_temperature import KnownTemperature, VertexGrid
 from core.problem import Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.result import Solution
 from core.scene import FixedTexture, Outlet, Patch, Scene, SolveModel, View
 from core.solve.draft.draft import draft_grid, solve_draft
+from core.solve.draft.temperature_system import Part, System
 from core.view_frame import turn_to
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(4.0, 3.0, 2.7))
@@ -97,6 +98,39 @@ def test_a_single_view_of_a_side_wall_finds_what_it_sees(shifts):
     back = solve_draft(Problem(replace(SCENE, views=SCENE.views[:1]), shifts[:1]))
     assert side.outcome.name == "converged"
     assert errors_k(side)[1] < 0.6 * errors_k(back)[1]
+
+
+def test_a_view_that_sees_nothing_but_noise_adds_hardly_any(shifts):
+    """Air that the view along x sees well, beside a view along y whose noise is as large as what the other sees."""
+    back, side = shifts[:2]
+    size_px = float(np.sqrt(np.mean(side.displacement_px**2)))
+    drawn = np.random.default_rng(1).standard_normal(back.displacement_px.shape)
+    noisy = replace(
+        back,
+        displacement_px=size_px * drawn,
+        information_per_px2=np.broadcast_to(np.eye(2) / size_px**2, (len(drawn), 2, 2)).copy(),
+    )
+    alone = solve_draft(Problem(replace(SCENE, views=SCENE.views[1:2]), (side,)))
+    both = solve_draft(Problem(replace(SCENE, views=SCENE.views[:2]), (noisy, side)))
+    assert errors_k(both)[0] < 1.05 * errors_k(alone)[0]
+
+
+def test_the_prior_is_that_of_steps_between_vertices():
+    """Waves of the cosine transform and differences between vertices say the same of one part."""
+    grid = VertexGrid(ROOM, (5, 4, 6))
+    part = Part(2.0, (3.0, 5.0, 7.0))
+    known = KnownTemperature(np.zeros(grid.shape, bool), np.zeros(grid.shape), np.ones(grid.shape), ())
+    system = System(grid, (), (), (), (), known, 1.0, (part,), {}, None)
+    n = np.random.default_rng(0).standard_normal(grid.shape)
+    steps = sum(f * np.sum(np.diff(n, axis=axis) ** 2) for axis, f in enumerate(part.stiffness))
+    assert np.sum(n * system.smooth(n)) == pytest.approx(part.mass * np.sum(n**2) + steps)
+    # A profile that is free costs its steps alone, and its departures what they did.
+    profile = n.mean((0, 1), keepdims=True) + np.zeros_like(n)
+    free = replace(system, profile=11.0)
+    assert np.sum(profile * free.smooth(profile)) == pytest.approx(11.0 * np.sum(np.diff(profile[0, 0]) ** 2))
+    assert free.smooth(n - profile) == pytest.approx(system.smooth(n - profile))
+    # Of two alike parts the sum may be twice as large in the square.
+    assert replace(system, parts=(part, part)).smooth(n) == pytest.approx(system.smooth(n) / 2)
 
 
 def test_cells_are_as_fine_along_an_axis_as_some_view_sees_it():
