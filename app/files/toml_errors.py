@@ -101,6 +101,8 @@ def _sentence(path: Path, message: str, unknown: bool) -> str:
 
 
 def _message(error: Any, kind: Any) -> str:
+    if error["type"] == "missing":
+        return "it is missing; give it"
     if error["type"] not in _UNKNOWN:
         return error["msg"].removeprefix("Value error, ")
     near = _near(error["loc"], kind)

@@ -219,9 +219,12 @@ def other_way(likeness: float) -> list[str]:
 
 def another_closure(name: str, left: float, stated: str, stated_left: float) -> str:
     """A sentence that says which closure was taken, and why."""
+    # As many digits as tell the two apart.
+    digits = next((n for n in range(3) if f"{100 * left:.{n}f}" != f"{100 * stated_left:.{n}f}"), 3)
     return (
-        f"The images are explained better with {name} as the model of turbulence ({100 * left:.0f} % of the shifts "
-        f"left) than with {stated} ({100 * stated_left:.0f} %): it was taken. State flow.transport to keep one."
+        f"The images are explained better with {name} as the model of turbulence ({100 * left:.{digits}f} % of the "
+        f"shifts left) than with {stated} ({100 * stated_left:.{digits}f} %): it was taken. State flow.transport to "
+        "keep one."
     )
 
 

@@ -94,13 +94,13 @@ WRONG = {
         "principal_px = [50.0, 40.0]",
         "principal_px = [50.0]",
         (26, 1),
-        "principal_px.1: Field required",
+        "principal_px.1: it is missing",
     ),
     "a key that is missing": (
         '  wall = "x_min"\n',
         "",
         (38, 3),
-        "scene.boundary.1.patch.wall: Field required",
+        "scene.boundary.1.patch.wall: it is missing",
     ),
     "degrees for kelvin": ("= 293.15", "= 20.0", (17, 57), "20 degrees Celsius"),
     "Celsius in a table of an array": (
@@ -156,7 +156,7 @@ def test_a_mistake_is_told_at_its_line_and_column_in_one_sentence(case, tmp_path
     # One mistake, one sentence: nothing of the members of a union that were not meant.
     if "missing" not in said and case != "an unknown key of the second table of an array":
         assert said.count(": ") <= 3, said
-    assert "Field required" not in said or case in ("too few items", "a key that is missing"), said
+    assert "it is missing; give it" not in said or case in ("too few items", "a key that is missing"), said
 
 
 def test_two_mistakes_are_told_in_the_order_of_the_file():

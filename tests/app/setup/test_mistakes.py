@@ -121,7 +121,7 @@ WRONG: list[tuple[Keys, Any, str, str]] = [
     (("camera", "width_px"), 3, "camera.width_px", r"16"),
     (("camera", "bits"), 40, "camera.bits", r"16"),
     (("supply", 0, "wal"), "x_min", "supply[0].wal", r"unknown key .*wal'; did you mean 'wall'"),
-    (("supply", 0, "temperature"), GONE, "supply[0].temperature", r"[Rr]equired"),
+    (("supply", 0, "temperature"), GONE, "supply[0].temperature", r"it is missing"),
 ]
 
 

@@ -106,7 +106,7 @@ WRONG = [
     ('air = "20 C"', 'air = "20"', r"air: .*'20' has no unit.*18 C"),
     ('air = "20 C"', "air = 293.15", r"air: .*in quotes"),
     ('air = "20 C"', 'air = "20 K"', r"air: .*'20 K' is out of range.*is the unit right"),
-    ('air = "20 C"', "", r"air: Field required"),
+    ('air = "20 C"', "", r"air: it is missing"),
     ('["4 m", "3 m", "2.7 m"]', '["4000 m", "3 m", "2.7 m"]', r"room.0: .*millimetres \(4000 mm\)"),
     ('["4 m", "3 m", "2.7 m"]', '["4 m", "3 m"]', r"room"),
     ('["4 m", "3 m", "2.7 m"]', '["4 m", "3 m", "2.7 l"]', r"room.2: .*'l' is no unit of length"),

@@ -1,5 +1,6 @@
 """What a room explains of the images, with the noise taken out, and what may then be said of entries."""
 
+import re
 from dataclasses import replace
 
 import equinox as eqx
@@ -7,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from core.estimate.diagnostics import contradictions, misfit, other_way
+from core.estimate.diagnostics import another_closure, contradictions, misfit, other_way
 from core.estimate.discrepancy import temperature_correction
 from core.estimate.explained import explained, likeness
 from core.estimate.least_squares import Posterior
@@ -210,3 +211,10 @@ def test_a_panel_that_is_colder_beside_a_warm_source_is_no_source_nor_the_other_
         f"12 K {word}",
         f"53 K {word}",
     ]
+
+
+@pytest.mark.parametrize(
+    ("left", "stated", "said"), [(0.33, 0.41, "33 %.*41 %"), (0.3041, 0.3049, "30.4 %.*30.5 %")]
+)
+def test_two_closures_shares_differ_in_words_too(left, stated, said):
+    assert re.search(said, another_closure("large_eddies", left, "k_epsilon", stated))
