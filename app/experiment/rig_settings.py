@@ -51,7 +51,7 @@ class SimulatedCameraSettings(Strict):
     snapshots: str | None = None
     """The air of that room at several moments, in the experiment; without them the air is steady."""
     exposure_s: Annotated[float, Field(gt=0, le=60)] = 0.02
-    """Exposure of a frame."""
+    """Exposure of a frame; in 0.02 s the pattern's white fills the well."""
     frame_rate_hz: Annotated[float, Field(gt=0, le=10_000)] = 30.0
     """Frames a second, at most."""
     seed: int = 0

@@ -30,6 +30,8 @@ from drivers.simulated.projector.open import TWINS, open_twin
 
 # A lamp that warms up for longer than an hour is a slip.
 LONGEST_S = 3600.0
+# A simulated room is as bright as fills a camera's well in this time where its pattern is white.
+_FULL_WELL_S = 0.02
 
 
 def open_camera(experiment: Experiment, air: AirState, view: int = 0, moment: int | None = None) -> Camera:
@@ -160,6 +162,7 @@ class PracticeStage:
             seed=2 * settings.seed + VIEWS_APART * view,
             noise=noise,
             exposure_s=settings.exposure_s,
+            full_well_exposure_s=_FULL_WELL_S,
             name=f"simulated {name}",
         )
 
@@ -214,6 +217,7 @@ def _simulated_camera(
         noise=_sensor(scene, settings, view),
         flicker=settings.world.flicker,
         exposure_s=settings.exposure_s,
+        full_well_exposure_s=_FULL_WELL_S,
         name=f"simulated {scene.views[view].name}",
     )
 

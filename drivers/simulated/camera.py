@@ -1,8 +1,8 @@
 """A camera that sees whatever its injected view shows: photons, noise, buffers, and scripted mishaps.
 
-It knows no optics. `view()` returns luminance, 1 of which fills the well at the exposure that the camera
-was made with. Return the same array object while nothing changed: the expected counts are then reused.
-`moving(time_s)` takes its place where what is seen changes with the time since the camera was made.
+It knows no optics. `view()` returns luminance, 1 of which fills the well at `full_well_exposure_s`, or at the
+exposure that the camera was made with. Return the same array object while nothing changed: the expected counts are
+then reused. `moving(time_s)` takes its place where what is seen changes with the time since the camera was made.
 """
 
 import math
@@ -43,6 +43,7 @@ class SimulatedCamera:
         seed: int,
         noise: SensorNoise | None = None,
         exposure_s: float = 1 / 60,
+        full_well_exposure_s: float | None = None,
         frame_rate_hz: float = 30.0,
         clock: Clock | None = None,
         faults: FaultScript = no_faults,
@@ -52,7 +53,7 @@ class SimulatedCamera:
     ) -> None:
         self.shift_px = (0.0, 0.0)
         self._view, self._moving, self._seed, self._noise = view, moving, seed, noise or SensorNoise()
-        self._full_well_exposure_s = self._exposure_s = exposure_s
+        self._exposure_s, self._full_well_exposure_s = exposure_s, full_well_exposure_s or exposure_s
         self._gain, self._frame_rate_hz, self._name = 1.0, frame_rate_hz, name
         self._before, self._acts_from = (exposure_s, 1.0), 0
         self._clock, self._faults, self._flicker = clock or VirtualClock(), faults, flicker

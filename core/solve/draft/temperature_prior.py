@@ -9,6 +9,8 @@ has moved (moment matching). So a cool room gets a small prior, broad fields, wh
 hardly sees, stay near the prior, and what one view sees of a jet does not make the others take noise for air.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter
@@ -18,6 +20,7 @@ from core.air import Air
 from core.data_error import CORRELATED_DATA, REPRESENTATION
 from core.geometry import face_of
 from core.known_temperature import KnownTemperature, VertexGrid, known_temperature, plane_on_grid
+from core.motion import without_motion
 from core.problem import Problem, ShiftMeasurement
 from core.scene import Heater, Inlet, Outlet
 from core.setting import setting
@@ -29,6 +32,8 @@ _LEAST_RANGE_K = 0.1
 # A profile rises by something between nothing and the range of the air that is known: the mean and deviation of that.
 _RISE, RISE_STD = 0.5, 12**-0.5
 _DRAWS = 4
+# So many deviations of a shared error are of any size.
+_ANY = 1e4
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -154,7 +159,10 @@ def _powers(
     grid: VertexGrid,
     lengths: list[tuple[float, float, float]],
 ) -> tuple[Float[np.ndarray, " views"], Float[np.ndarray, " views"], Float[np.ndarray, "views parts"]]:
-    """Of each view's shifts: what they have beyond noise, their noise, and what a part of size 1 adds."""
+    """Of each view's shifts: what they have beyond noise, their noise, and what a part of size 1 adds.
+
+    What a motion of the camera would make does not count, however large: where its reading is wrong it is no air.
+    """
     random = np.random.default_rng(0)
     parts = []
     for reach in lengths:
@@ -168,11 +176,20 @@ def _powers(
         used = weight[:, 0, 0] > 0
         spread = np.linalg.cholesky(np.linalg.inv(shift.information_per_px2[used]))
         noise = _most(np.einsum("wab,wb->wa", spread, random.standard_normal((used.sum(), 2))))
-        seen = _most((shift.displacement_px - operator.apply(prior))[used])
-        moved = [np.mean([_most(operator.apply(draw)[used]) for draw in draws]) for draws in parts]
+        still = _without_any_motion(shift, weight)
+        seen = _most(still(shift.displacement_px - operator.apply(prior))[used])
+        moved = [np.mean([_most(still(operator.apply(draw))[used]) for draw in draws]) for draws in parts]
         rows.append([seen - noise, max(noise, _TINY), *moved])
     beyond, noises, *of_parts = np.array(rows).T
     return beyond, noises, np.stack(of_parts, axis=1)
+
+
+def _without_any_motion(
+    shift: ShiftMeasurement, weight: Float[np.ndarray, "windows 2 2"]
+) -> Callable[[Float[np.ndarray, "windows 2"]], Float[np.ndarray, "windows 2"]]:
+    """Takes out of shifts what a motion of the camera would make, of any size."""
+    errors_px = shift.common_errors_px
+    return (lambda of: of) if errors_px is None else without_motion(_ANY * errors_px, weight).apply
 
 
 def _most(shifts_px: Float[np.ndarray, "windows 2"]) -> float:

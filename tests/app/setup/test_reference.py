@@ -28,7 +28,7 @@ def test_every_key_has_its_meaning(kind):
 @pytest.mark.parametrize(
     "line",
     [
-        "| `exposure_s` | Exposure of a frame. | s | above 0 to 60 | `0.02` | `0.02` |",
+        "| `frame_rate_hz` | Frames a second, at most. | Hz | above 0 to 10000 | `30` | `30` |",
         "| `temperature_k` | Its temperature. | K | 150 to 5000 |  | `299.15` |",
         '| `pixel_pitch` | From one pixel of the sensor to the next. | length | 1e-07 to 500 m | - | `"5.86 um"` |',
         '| `steps` | Steps along a ray. |  | `"auto"`, 1 to 16384 | `"auto"` | `"auto"` |',

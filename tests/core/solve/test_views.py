@@ -8,6 +8,7 @@ import pytest
 
 from core.geometry import Box, looking_along_y
 from core.known_temperature import KnownTemperature, VertexGrid
+from core.motion import CameraMotion
 from core.problem import Problem, ShiftMeasurement
 from core.rays.operator import build
 from core.result import Solution
@@ -113,6 +114,19 @@ def test_a_view_that_sees_nothing_but_noise_adds_hardly_any(shifts):
     alone = solve_draft(Problem(replace(SCENE, views=SCENE.views[1:2]), (side,)))
     both = solve_draft(Problem(replace(SCENE, views=SCENE.views[:2]), (noisy, side)))
     assert errors_k(both)[0] < 1.05 * errors_k(alone)[0]
+
+
+def test_a_motion_that_was_read_wrongly_makes_the_air_no_larger(shifts):
+    """A view along x that moved by ten times its signal, where the motion is claimed to be known to its noise."""
+    back, side = shifts[:2]
+    known = CameraMotion(SCENE.views[1].camera, NOISE_PX * np.eye(6))
+    size_px = float(np.sqrt(np.mean(side.displacement_px**2)))
+    read = replace(side, motion=known)
+    wrong = replace(read, displacement_px=side.displacement_px + np.array([10.0 * size_px, 0.0]))
+    rightly, wrongly = (
+        solve_draft(Problem(replace(SCENE, views=SCENE.views[:2]), (back, view))) for view in (read, wrong)
+    )
+    assert np.ptp(wrongly.temperature_std_k) == pytest.approx(np.ptp(rightly.temperature_std_k), rel=0.3)
 
 
 def test_the_prior_is_that_of_steps_between_vertices():
