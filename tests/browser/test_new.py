@@ -133,6 +133,20 @@ def test_a_room_that_the_page_does_not_know_is_typed_in_from_a_tape_measure(
     assert watched.complaints == []
 
 
+def test_a_room_that_is_sent_before_the_page_has_read_its_templates_is_chosen(
+    station: Station, opens: Opens, tmp_path: Path
+):
+    watched = opens(station.address)
+    page, held = watched.page, []
+    page.route("**/answers/templates", lambda route: held.append(route))
+    page.get_by_role("button", name="New experiment").click()
+    with page.expect_response(lambda one: "/uploads" in one.url and one.request.method == "POST"):
+        page.get_by_label("Another room for a simulated camera").set_input_files(room_file(tmp_path))
+    for route in held:
+        route.continue_()
+    expect(page.get_by_role("radio", name=re.compile("uploaded room"))).to_be_checked()
+
+
 def test_pictures_of_another_camera_are_brought_and_what_is_printed_is_a_pdf(
     station: Station, opens: Opens, tmp_path: Path
 ):

@@ -24,7 +24,7 @@ from core.motion import without_motion
 from core.problem import Problem, ShiftMeasurement
 from core.scene import Heater, Inlet, Outlet
 from core.setting import setting
-from core.solve.draft.temperature_system import Part, ShiftOperator, Volume
+from core.solve.draft.temperature_system import AirPart, ShiftOperator, Volume
 
 # A thousandth of a kelvin, as excess refractivity.
 _LEAST_SIZE = 1e-9
@@ -127,7 +127,7 @@ def prior_parts(
     prior: Volume,
     grid: VertexGrid,
     settings: TemperatureSettings,
-) -> tuple[Part, ...]:
+) -> tuple[AirPart, ...]:
     """The parts of n - prior, one for each axis that views look along; `along` is each view's.
 
     A part's size is that at which it moves its views' patterns as far as they moved beyond their noise, and beyond
@@ -147,7 +147,7 @@ def prior_parts(
         fewer = 1.0 if len(axes) == 1 else thinned(grid.shape[axis]) / grid.shape[axis]
         mass = 0.01 * fewer / square
         x, y, z = (mass * (length / h) ** 2 for length, h in zip(reach, grid.spacing_m, strict=True))
-        parts.append(Part(mass, (x, y, z)))
+        parts.append(AirPart(mass, (x, y, z)))
     return tuple(parts)
 
 

@@ -39,7 +39,7 @@ class ShiftOperator(Protocol):
 
 
 @dataclass(frozen=True)
-class Part:
+class AirPart:
     """Air that varies slowly along the axis that a view looks along: what n costs at a vertex, and its steps.
 
     `stiffness` is the weight of the square of a step from one vertex to the next, along x, y and z.
@@ -63,7 +63,7 @@ class System:
     known: KnownTemperature
     per_k: float
     # n is the sum of these, which are independent: one for each axis that a view looks along.
-    parts: tuple[Part, ...]
+    parts: tuple[AirPart, ...]
     slopes: Slopes
     # Where no plane gives the profile over height: how much a step of it from one level to the next weighs.
     profile: float | None

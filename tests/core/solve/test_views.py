@@ -14,7 +14,7 @@ from core.rays.operator import build
 from core.result import Solution
 from core.scene import FixedTexture, Outlet, Patch, Scene, SolveModel, View
 from core.solve.draft.draft import draft_grid, solve_draft
-from core.solve.draft.temperature_system import Part, System
+from core.solve.draft.temperature_system import AirPart, System
 from core.view_frame import turn_to
 
 ROOM = Box(lower_m=(0.0, 0.0, 0.0), upper_m=(4.0, 3.0, 2.7))
@@ -132,7 +132,7 @@ def test_a_motion_that_was_read_wrongly_makes_the_air_no_larger(shifts):
 def test_the_prior_is_that_of_steps_between_vertices():
     """Waves of the cosine transform and differences between vertices say the same of one part."""
     grid = VertexGrid(ROOM, (5, 4, 6))
-    part = Part(2.0, (3.0, 5.0, 7.0))
+    part = AirPart(2.0, (3.0, 5.0, 7.0))
     known = KnownTemperature(np.zeros(grid.shape, bool), np.zeros(grid.shape), np.ones(grid.shape), ())
     system = System(grid, (), (), (), (), known, 1.0, (part,), {}, None)
     n = np.random.default_rng(0).standard_normal(grid.shape)
