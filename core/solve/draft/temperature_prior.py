@@ -32,7 +32,7 @@ _LEAST_RANGE_K = 0.1
 # A profile rises by something between nothing and the range of the air that is known: the mean and deviation of that.
 _RISE, RISE_STD = 0.5, 12**-0.5
 _DRAWS = 4
-# So many deviations of a shared error are of any size.
+# A shared error may have any size if its deviation is so many times the stated one.
 _ANY = 1e4
 _TINY = float(np.finfo(float).tiny)
 

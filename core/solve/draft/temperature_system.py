@@ -95,7 +95,7 @@ class System:
         """Gradient of the prior's terms: size and smoothness, of departures from a profile that is free."""
         return np.asarray(idctn(self.precision * dctn(n, norm="ortho"), norm="ortho"))
 
-    def stiffness(self, axis: int) -> float:
+    def joint_stiffness(self, axis: int) -> float:
         """What the parts together weigh on steep steps along an axis."""
         return 1 / sum(1 / part.stiffness[axis] for part in self.parts)
 
@@ -257,7 +257,7 @@ def _modes(
     for end in (0, -1):
         if mask[end].mean() > 0.5:
             weight = np.mean(1 / (std[end][mask[end]] * system.per_k) ** 2)
-            pinned[end, end] += weight / system.stiffness(axis)
+            pinned[end, end] += weight / system.joint_stiffness(axis)
     values, vectors = np.linalg.eigh(pinned)
     return values, vectors, np.einsum("ai,ab,bi->i", vectors, laplacian, vectors)
 

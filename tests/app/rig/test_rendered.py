@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.ndimage import binary_dilation
 
 from app.experiment.folder import ExperimentSettings, create_experiment, open_experiment
@@ -77,3 +78,17 @@ def test_dark_frames_are_taken_with_the_lens_covered(tmp_path):
     assert burst.verdicts[0].name == "dark level"
     assert all(one.good for one in burst.verdicts)
     assert burst.mean.std() > 0.0
+
+
+def test_half_the_exposure_gives_half_the_light(tmp_path):
+    options, light = RigOptions(camera_px=(160, 120), frames=1, stand_off_m=4.0), {}
+    for exposure_s in (0.01, 0.02):
+        settings = SimulatedCameraSettings(exposure_s=exposure_s)
+        experiment = open_experiment(
+            simulate(VOLUME, tmp_path / f"{exposure_s}", options, "operator", settings)
+        )
+        noise = experiment.settings.scene.views[0].noise
+        dark = noise.dark_counts / (2**noise.bits - 1)
+        with open_camera(experiment, "still") as camera:
+            light[exposure_s] = float(np.mean(run_capture(camera, CapturePlan(frames=2)).mean)) - dark
+    assert light[0.02] == pytest.approx(2.0 * light[0.01], rel=0.01)

@@ -12,6 +12,7 @@ from app.errors import BadInputError
 from app.experiment.boundary import read_sensors
 from app.experiment.folder import open_experiment
 from app.pipeline import reconstruct
+from app.rig.open import open_camera
 from app.setup.experiment import TEMPLATES, new_experiment, template
 from app.simulate.rehearsal import SAMPLE_ROOM
 from app.volume.file import read_volume
@@ -19,6 +20,8 @@ from core.geometry import face_of
 from core.room.boundary_conditions import room_layout
 from core.room.room_grid import room_grid
 from core.scene import Inlet, Outlet, Scene
+from drivers.burst import CapturePlan
+from drivers.capture import run_capture
 
 T = TypeVar("T")
 JET = template("wall-jet")
@@ -61,6 +64,14 @@ def run(*words, text: str | None = None) -> str:
 
 def first(scene: Scene, kind: type[T]) -> T:
     return next(item for item in scene.boundary if isinstance(item, kind))
+
+
+def test_a_capture_of_the_packaged_room_is_not_saturated(tmp_path):
+    (tmp_path / "answers.toml").write_text(template("sample"))
+    run("new", tmp_path / "lab", "--from", tmp_path / "answers.toml")
+    with open_camera(open_experiment(tmp_path / "lab"), "still") as camera:
+        verdicts = run_capture(camera, CapturePlan(frames=2)).verdicts
+    assert [one.good for one in verdicts if one.name == "saturation"] == [True]
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
