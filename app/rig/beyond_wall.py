@@ -13,7 +13,7 @@ from scipy import ndimage
 from core.fields import AbstractField
 from core.geometry import WALLS, Box, Optics, crop
 from core.plan.print_choice import suited_print
-from core.rays.visibility import sees_wall
+from core.rays.visibility import sees_wall, wall_points
 from core.render import render_flow, render_reference
 from core.scene import FixedTexture, Scene
 
@@ -26,6 +26,8 @@ FRAME_SEED = 1_000_003
 MARKS_SEED, _COARSER, _RIM_PX = 1_000_033, 4.0, 8
 # Of side walls, floor and ceiling; seen aslant, so coarser.
 _SIDES_SEED, _ASLANT, _EVERY_PX = 1_000_081, 3.0, 8
+# The width of a print's faded edge.
+_FADE_PX = 8.0
 
 
 def in_frame(image: Picture, scene: Scene, view: int, focal_px: float) -> Picture:
@@ -100,10 +102,24 @@ def _print(scene: Scene, view: int, focal_px: float, seed: int) -> FixedTexture:
 
 
 def _strip(scene: Scene, view: int, camera: Optics, strip: Strip) -> Picture:
-    """Rows and columns of what this camera sees through still air."""
+    """Rows and columns of what this camera sees through still air; the print fades out at its edges."""
     part = replace(scene.views[view], camera=crop(camera, *strip), marks=())
-    views = tuple(part if i == view else v for i, v in enumerate(scene.views))
-    return render_reference(replace(scene, views=views), view)
+    scene = replace(scene, views=tuple(part if i == view else v for i, v in enumerate(scene.views)))
+    return render_reference(scene, view) * _lit(scene, view)
+
+
+def _lit(scene: Scene, view: int) -> Picture:
+    """How light the print is where each pixel looks, as a share: it fades out towards its wall's edges.
+
+    A cut edge is sharper than pixels can follow: a motion of 0.1 px would be read up to 0.03 px wrong beside it.
+    """
+    camera, room = scene.views[view].camera, scene.room
+    columns, rows = np.arange(float(camera.width_px)), np.arange(float(camera.height_px))
+    at_m = wall_points(scene, view, np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2))
+    inside_m = np.minimum(at_m - room.lower_m, np.asarray(room.upper_m) - at_m)[:, ::2].min(axis=1)
+    range_m = np.linalg.norm(at_m - camera.position_m, axis=1)
+    share = np.clip(np.nan_to_num(inside_m * min(camera.focal_px) / range_m / _FADE_PX), 0.0, 1.0)
+    return (share**2 * (3.0 - 2.0 * share)).reshape(len(rows), len(columns)).astype(np.float32)
 
 
 def _strips_around(inside: np.ndarray) -> list[Strip]:

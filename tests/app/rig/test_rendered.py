@@ -6,14 +6,18 @@ from scipy.ndimage import binary_dilation
 
 from app.experiment.folder import ExperimentSettings, create_experiment, open_experiment
 from app.experiment.rig_settings import RigSettings, SimulatedCameraSettings
+from app.reconstruct.drift import mount
+from app.reconstruct.yardstick import Exposures, read_motion
 from app.rig.beyond_wall import with_marks
 from app.rig.open import air_of, open_camera
 from app.rig.rendered import seen_picture, with_objects
 from app.simulate.experiment import simulate
 from app.volume.scene import RigOptions
+from core.displacement import window_centres
 from core.geometry import Box, looking_along_y
+from core.motion import motion_basis
 from core.objects import RoomObject
-from core.rays.visibility import hidden_by_objects
+from core.rays.visibility import hidden_by_objects, sees_wall
 from core.scene import FixedTexture, Marks, Scene, View
 from drivers.burst import CapturePlan
 from drivers.capture import run_capture
@@ -68,6 +72,28 @@ def test_beyond_the_wall_the_rooms_other_walls_move_with_the_air_and_a_frame_doe
     # What is seen of the side walls lies near the back wall, behind nearly as much air; its print is coarser.
     assert moved["room"][0] > 0.03
     assert moved["room"][1] > 0.05 * moved["room"][2] > 0.0
+
+
+def test_a_frame_that_ends_within_the_picture_tells_the_same_motion_as_the_wall_does(tmp_path):
+    """A side wall is narrow: left and right of its frame nothing is seen. Both show the mount alone."""
+    camera = SimulatedCameraSettings(noise_free=True, drift_px=0.1)
+    options = RigOptions(camera_px=(256, 192), frames=1, stand_off_m=4.0, walls=("x_max",))
+    experiment = open_experiment(simulate(VOLUME, tmp_path / "e", options, "operator", camera))
+    scene = experiment.settings.scene
+    before, after = (seen_picture(experiment, camera, "still", 0, steps) for steps in (0, 1))
+    assert (before == 0).mean() > 0.1
+
+    optics, variance = scene.views[0].camera, np.full(before.shape, 1e-6, np.float32)
+    exposures = Exposures(before, after, variance, 8, optics)
+    centres = window_centres(before.shape, 8)
+    on_wall, around = (sees_wall(scene, 0, centres, margin_px=margin) for margin in (8.0, -14.0))
+    by_wall, by_border = (read_motion(exposures, where, mount(1.0)) for where in (on_wall, ~around))
+
+    assert by_wall is not None
+    assert by_border is not None
+    apart_px = motion_basis(centres, optics) @ (by_border.motion_px - by_wall.motion_px)
+
+    assert np.sqrt(np.mean(np.sum(apart_px**2, axis=1))) < 0.005
 
 
 def test_dark_frames_are_taken_with_the_lens_covered(tmp_path):
