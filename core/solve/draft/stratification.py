@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from core.significance import TO_ONE_SIDE
+from core.solve.draft.temperature_deviation import rise_of
 from core.solve.draft.temperature_system import System, Volume
 
 
@@ -13,7 +14,7 @@ def upside_down(temperature_k: Volume, system: System, solve: Callable[[Volume],
 
     `solve` inverts the Hessian of `system`, in which the deviation is counted.
     """
-    slope = _rise_of(system)
+    slope = rise_of(system.grid.shape)
     rise_k = float(np.sum(slope * temperature_k))
     if rise_k >= 0.0:
         return []
@@ -25,11 +26,3 @@ def upside_down(temperature_k: Volume, system: System, solve: Callable[[Volume],
         f"(deviation {std_k:.2f} K). Such air would turn over within minutes. Reference and flow may be swapped: "
         "check which picture was taken with the air moving."
     ]
-
-
-def _rise_of(system: System) -> Volume:
-    """The field whose product with a temperature is its rise from floor to ceiling, by least squares over height."""
-    shape = system.grid.shape
-    height = np.linspace(-0.5, 0.5, shape[2])
-    rise = height / (np.sum(height**2) * shape[0] * shape[1])
-    return np.broadcast_to(rise, shape).copy()

@@ -36,7 +36,7 @@ from core.setting import SettingError
 from core.solve.draft.conjugate_gradients import Product, conjugate_gradients
 from core.solve.draft.front_layers import front_layers_px
 from core.solve.draft.stratification import upside_down
-from core.solve.draft.temperature_deviation import deviation
+from core.solve.draft.temperature_deviation import BROAD, deviation
 from core.solve.draft.temperature_prior import (
     TemperatureSettings,
     data_weight,
@@ -90,26 +90,28 @@ def solve_temperature(
         # The field and the draws are solves of one kind, so their number says how much is done.
         done = sum("draw" in row for row in history) + 1.0
         found, _ = _solved(doubted, rough, rhs, _DRAWN, settings, watch)
-        elapsed_s, share = time.perf_counter() - started, (1.0 + done) / (1.0 + settings.draws)
+        elapsed_s, share = time.perf_counter() - started, (1.0 + done) / (1.0 + BROAD + settings.draws)
         row = {"doing": "draw what may be otherwise", "draw": done, "share": share, "elapsed_s": elapsed_s}
         history.append(row)
         watch.tell(row)
         return found
 
-    std = deviation(doubted, drawn, settings.draws, seed=0)
     temperature = _kelvin(air, n)
+    std_k = None
+    if settings.draws:
+        # dT = (T / T0)^2 dn T0 / N0.
+        scale = (temperature / air.ambient_temperature_k) ** 2 / system.per_k
+        std_k = scale * deviation(doubted, drawn, settings.draws)
     turned = upside_down(
         temperature, doubted, lambda rhs: _solved(doubted, rough, rhs, _DRAWN, settings, watch)[0]
     )
-    # dT = (T / T0)^2 dn T0 / N0.
-    std_k = std / system.per_k * (temperature / air.ambient_temperature_k) ** 2
     x, y, z = grid.axes_m
     return Solution(
         x_m=x,
         y_m=y,
         z_m=z,
         temperature_k=temperature,
-        temperature_std_k=std_k if settings.draws else None,
+        temperature_std_k=std_k,
         outcome=Outcome.converged if settled else Outcome.step_limit,
         solver_s=time.perf_counter() - started,
         history=tuple(history),

@@ -2,7 +2,9 @@
 
 A term 1/2 |R (n - a)|^2 of the objective gets R^T e for white noise e on the right hand side: the solution of the
 sum is a draw of the posterior (perturb and optimise). What is left of the prior after the measurements is then in
-the scatter of the draws, smoothed.
+the scatter of the draws, smoothed: neighbours stand in for more draws. The room's mean and the rise of its profile
+have one value a draw, and are often what is least certain. So their covariance is computed, by a solve each, and the
+draws tell what is left when both are known.
 """
 
 from collections.abc import Callable
@@ -15,17 +17,32 @@ from scipy.ndimage import gaussian_filter
 from core.solve.draft.temperature_system import System, Volume
 
 _SMOOTH_VERTICES = 1.5
+# The room's mean and its profile's rise.
+BROAD = 2
 
 
-def deviation(
-    system: System, solve: Callable[[Volume], Volume], draws: int, seed: int
-) -> Float[np.ndarray, "nx ny nz"]:
-    """One sigma of n from `draws` draws; `solve` inverts the Hessian, roughly."""
-    random = np.random.default_rng(seed)
-    square = np.zeros(system.grid.shape)
+def deviation(system: System, solve: Callable[[Volume], Volume], draws: int) -> Float[np.ndarray, "nx ny nz"]:
+    """One sigma of n from `draws` draws, one at least; `solve` inverts the Hessian, roughly."""
+    shape = system.grid.shape
+    broad = np.stack([np.full(shape, 1.0 / np.prod(shape)), rise_of(shape)]).reshape(BROAD, -1)
+    answers = np.stack([solve(one.reshape(shape)).ravel() for one in broad])
+    covariance = broad @ answers.T
+    # How n goes with the mean and the rise.
+    with_them = np.linalg.solve((covariance + covariance.T) / 2, answers)
+    random, square = np.random.default_rng(0), np.zeros(shape)
     for _ in range(draws):
-        square += solve(_perturbation(system, random)) ** 2
-    return np.sqrt(gaussian_filter(square / max(draws, 1), _SMOOTH_VERTICES, mode="nearest"))
+        drawn = solve(_perturbation(system, random)).ravel()
+        square += np.reshape(drawn - (broad @ drawn) @ with_them, shape) ** 2
+    of_both = np.reshape(np.sum(answers * with_them, axis=0), shape)
+    rest = gaussian_filter(square / draws, _SMOOTH_VERTICES, mode="nearest")
+    return np.sqrt(rest + np.maximum(of_both, 0.0))
+
+
+def rise_of(shape: tuple[int, int, int]) -> Volume:
+    """The field whose product with a temperature is its rise from floor to ceiling, by least squares over height."""
+    height = np.linspace(-0.5, 0.5, shape[2])
+    rise = height / (np.sum(height**2) * shape[0] * shape[1])
+    return np.broadcast_to(rise, shape).copy()
 
 
 def _perturbation(system: System, random: np.random.Generator) -> Volume:
