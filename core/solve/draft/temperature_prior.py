@@ -43,8 +43,8 @@ class TemperatureSettings:
 
     `across` and `along` are across and along the view; `representation` is the part of the shift's size
     that this grid cannot represent, added to the noise. The deviations come from `draws` draws of the
-    posterior (none: no deviations), in which so many windows count as one: what a grid cannot represent is wrong
-    in neighbouring windows alike.
+    posterior (none: no deviations), but for those of the mean and the rise (`temperature_deviation`). There so many
+    windows count as one: what a grid cannot represent is wrong in neighbouring windows alike.
     """
 
     across: float = 0.04
