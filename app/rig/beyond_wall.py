@@ -105,13 +105,13 @@ def _strip(scene: Scene, view: int, camera: Optics, strip: Strip) -> Picture:
     """Rows and columns of what this camera sees through still air; the print fades out at its edges."""
     part = replace(scene.views[view], camera=crop(camera, *strip), marks=())
     scene = replace(scene, views=tuple(part if i == view else v for i, v in enumerate(scene.views)))
-    return render_reference(scene, view) * _lit(scene, view)
+    return render_reference(scene, view) * _fade(scene, view)
 
 
-def _lit(scene: Scene, view: int) -> Picture:
-    """How light the print is where each pixel looks, as a share: it fades out towards its wall's edges.
+def _fade(scene: Scene, view: int) -> Picture:
+    """What the print's brightness is multiplied by in each pixel: 1, and down to 0 at the edges of its wall.
 
-    A cut edge is sharper than pixels can follow: a motion of 0.1 px would be read up to 0.03 px wrong beside it.
+    A cut edge is sharper than pixels can follow: a motion of 0.1 px is read up to 0.03 px wrong beside it.
     """
     camera, room = scene.views[view].camera, scene.room
     columns, rows = np.arange(float(camera.width_px)), np.arange(float(camera.height_px))
