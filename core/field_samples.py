@@ -1,10 +1,11 @@
 """Airs that a result allows: its T and u, each moved by a smooth random field of its own deviation.
 
-    sample = found + deviation x g,      corr(g(x), g(y)) = exp(-|x - y|^2 / (2 length^2))
+    sample = found + shared w + rest x g,      corr(g(x), g(y)) = exp(-|x - y|^2 / (2 length^2))
 
-A result keeps one standard deviation a vertex, and not how the deviations of two places go together; `length` is
-taken for that. The interval of a mean over many places is narrow for a short length and wide for a long one; that of
-one place is the same for any. Components and temperature are taken as independent.
+A result keeps one standard deviation a vertex, and of how the errors of two places go together only those that the
+whole field shares, if any (w: their sizes, of unit variance). For the rest of the deviation `length` is taken. The
+interval of a mean over many places is narrow for a short length and wide for a long one; that of one place is the
+same for any. Components and temperature are taken as independent.
 What is shut in the found flow is shut in every sample.
 """
 
@@ -27,11 +28,20 @@ def samples(solution: Solution, count: int, length_m: float, seed: int = 0) -> I
     for _ in range(count):
         temperature_k, velocity_m_s = solution.temperature_k, solution.velocity_m_s
         if solution.temperature_std_k is not None:
-            temperature_k = temperature_k + solution.temperature_std_k * _smooth(rng, roots)
+            temperature_k = temperature_k + _error_k(solution, rng, roots)
         if velocity_m_s is not None and solution.velocity_std_m_s is not None:
             moved = np.stack([_smooth(rng, roots) for _ in range(3)], axis=-1)
             velocity_m_s = velocity_m_s + solution.velocity_std_m_s * _shut(velocity_m_s, moved)
         yield replace(solution, temperature_k=temperature_k, velocity_m_s=velocity_m_s)
+
+
+def _error_k(solution: Solution, rng: np.random.Generator, roots: tuple[np.ndarray, ...]) -> Field:
+    """An error of T that the result allows."""
+    std_k, shared_k = np.asarray(solution.temperature_std_k), solution.temperature_shared_k
+    if shared_k is None:
+        return std_k * _smooth(rng, roots)
+    rest_k = np.sqrt(np.maximum(std_k**2 - np.sum(shared_k**2, axis=-1), 0.0))
+    return shared_k @ rng.standard_normal(shared_k.shape[-1]) + rest_k * _smooth(rng, roots)
 
 
 def _shut(velocity_m_s: np.ndarray, moved: np.ndarray) -> np.ndarray:

@@ -57,10 +57,12 @@ class Departures(eqx.Module):
 class Solution(eqx.Module):
     """T, p, u on vertices (end planes included), index order [ix, iy, iz]; None where not solved for.
 
-    Standard deviations are one sigma, on the same grid; `informed` is the share of the prior variance of
-    T that the measurements removed (0: the model speaks alone). `departures` are those of the bursts of a sequence,
-    of which the solution is the mean. `history` holds one dict a recorded iteration: numbers, and in `doing` what was
-    done. All fields are NaN in and on objects, which hold no air.
+    Standard deviations are one sigma, on the same grid. `temperature_shared_k` are errors of T that all places
+    have together: each is one sigma of an error that is independent of the others, and `temperature_std_k` holds
+    them. It is None where nobody knows how the errors of two places go together. `informed` is the share of the
+    prior variance of T that the measurements removed (0: the model speaks alone). `departures` are those of the
+    bursts of a sequence, of which the solution is the mean. `history` holds one dict a recorded iteration:
+    numbers, and in `doing` what was done. All fields are NaN in and on objects, which hold no air.
     """
 
     x_m: Float[np.ndarray, " nx"]
@@ -73,6 +75,7 @@ class Solution(eqx.Module):
     pressure_std_m2_s2: Float[np.ndarray, "nx ny nz"] | None = None
     velocity_std_m_s: Float[np.ndarray, "nx ny nz 3"] | None = None
     informed: Float[np.ndarray, "nx ny nz"] | None = None
+    temperature_shared_k: Float[np.ndarray, "nx ny nz errors"] | None = None
     departures: Departures | None = None
     outcome: Outcome = eqx.field(static=True, default=Outcome.converged)
     solver_s: float = 0.0
@@ -118,7 +121,7 @@ class Solution(eqx.Module):
 
 _FIELDS = (
     "temperature_k", "pressure_m2_s2", "velocity_m_s", "temperature_std_k", "pressure_std_m2_s2",
-    "velocity_std_m_s", "informed",
+    "velocity_std_m_s", "informed", "temperature_shared_k",
 )  # fmt: skip
 
 

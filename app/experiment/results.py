@@ -15,6 +15,7 @@ _DIMS = ("x", "y", "z")
 # The mark of a variable that follows from T and u.
 _DERIVED = "derived from T and u and their deviations"
 
+_SHARED = "T_shared"
 # Solution field -> (variable, units, CF standard name or '', long name)
 _VOLUMES = {
     "temperature_k": ("T", "K", "air_temperature", "temperature"),
@@ -55,6 +56,12 @@ def to_dataset(solution: Solution, attributes: dict[str, str], derived: Sequence
             for i, axis in enumerate(_DIMS):
                 names = {"units": "m s-1", "long_name": f"{long} along {axis}"}
                 variables[_component(stem, i)] = (_DIMS, np.asarray(values[..., i], np.float32), names)
+    if solution.temperature_shared_k is not None:
+        names = {
+            "units": "K",
+            "long_name": "errors of T, one sigma each, that all places share; part of T_std",
+        }
+        variables[_SHARED] = ((*_DIMS, "error"), np.asarray(solution.temperature_shared_k, np.float32), names)
     for one in derived:
         for ending, long, values in _ends(one):
             names = {"units": one.unit, "long_name": long, "source": _DERIVED}
@@ -151,6 +158,8 @@ def read_result(path: Path) -> Solution:
         shape = tuple(data.sizes[axis] for axis in _DIMS)
         for name, values in fields.items():
             _check(name, values, (*shape, 3) if name in _VECTORS else shape)
+        shared_k = data[_SHARED].to_numpy() if _SHARED in data else None
+        _check(_SHARED, shared_k, (*shape, data.sizes.get("error", 0)))
         return Solution(
             x_m=data["x"].to_numpy(),
             y_m=data["y"].to_numpy(),
@@ -159,6 +168,7 @@ def read_result(path: Path) -> Solution:
             solver_s=float(data.attrs["solver_s"]),
             notes=tuple(str(data.attrs["notes"]).splitlines()),
             departures=_departures(data),
+            temperature_shared_k=shared_k,
             **fields,
         )
 

@@ -30,6 +30,15 @@ def test_places_go_together_over_the_stated_length():
     assert np.corrcoef(middle, drawn[:, 3, 4, 4, 1])[0, 1] == pytest.approx(0.0, abs=0.2)
 
 
+def test_an_error_that_all_places_share_moves_them_together():
+    std_k, shared_k = np.full(SHAPE, 0.5), np.full((*SHAPE, 1), 0.4)
+    solution = found(temperature_std_k=std_k, temperature_shared_k=shared_k)
+    drawn = np.array([s.temperature_k for s in samples(solution, 400, 0.25)])
+    # 0.4^2 of 0.5^2 is common; the corners are 14 lengths apart.
+    assert np.corrcoef(drawn[:, 0, 0, 0], drawn[:, 8, 8, 8])[0, 1] == pytest.approx(0.64, abs=0.1)
+    np.testing.assert_allclose(drawn.std(axis=0), std_k, rtol=0.18)
+
+
 def test_what_has_no_deviation_does_not_move():
     (drawn,) = samples(found(), 1, 0.5)
     np.testing.assert_array_equal(drawn.temperature_k, 293.0)

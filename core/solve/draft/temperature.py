@@ -97,11 +97,12 @@ def solve_temperature(
         return found
 
     temperature = _kelvin(air, n)
-    std_k = None
+    std_k = shared_k = None
     if settings.draws:
         # dT = (T / T0)^2 dn T0 / N0.
         scale = (temperature / air.ambient_temperature_k) ** 2 / system.per_k
-        std_k = scale * deviation(doubted, drawn, settings.draws)
+        std, shared = deviation(doubted, drawn, settings.draws)
+        std_k, shared_k = scale * std, scale[..., None] * shared
     turned = upside_down(
         temperature, doubted, lambda rhs: _solved(doubted, rough, rhs, _DRAWN, settings, watch)[0]
     )
@@ -112,6 +113,7 @@ def solve_temperature(
         z_m=z,
         temperature_k=temperature,
         temperature_std_k=std_k,
+        temperature_shared_k=shared_k,
         outcome=Outcome.converged if settled else Outcome.step_limit,
         solver_s=time.perf_counter() - started,
         history=tuple(history),

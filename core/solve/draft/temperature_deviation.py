@@ -21,21 +21,29 @@ _SMOOTH_VERTICES = 1.5
 BROAD = 2
 
 
-def deviation(system: System, solve: Callable[[Volume], Volume], draws: int) -> Float[np.ndarray, "nx ny nz"]:
-    """One sigma of n from `draws` draws, one at least; `solve` inverts the Hessian, roughly."""
+def deviation(
+    system: System, solve: Callable[[Volume], Volume], draws: int
+) -> tuple[Float[np.ndarray, "nx ny nz"], Float[np.ndarray, "nx ny nz errors"]]:
+    """One sigma of n from `draws` draws, one at least, and what of it the whole field has together.
+
+    That is one sigma of each of two independent errors, of what goes with the mean and the rise. `solve` inverts the
+    Hessian, roughly.
+    """
     shape = system.grid.shape
     broad = np.stack([np.full(shape, 1.0 / np.prod(shape)), rise_of(shape)]).reshape(BROAD, -1)
     answers = np.stack([solve(one.reshape(shape)).ravel() for one in broad])
     covariance = broad @ answers.T
+    covariance = (covariance + covariance.T) / 2
+    root = np.linalg.cholesky(covariance)
     # How n goes with the mean and the rise.
-    with_them = np.linalg.solve((covariance + covariance.T) / 2, answers)
+    with_them = np.linalg.solve(covariance, answers)
     random, square = np.random.default_rng(0), np.zeros(shape)
     for _ in range(draws):
         drawn = solve(_perturbation(system, random)).ravel()
         square += np.reshape(drawn - (broad @ drawn) @ with_them, shape) ** 2
-    of_both = np.reshape(np.sum(answers * with_them, axis=0), shape)
+    shared = np.reshape(with_them.T @ root, (*shape, BROAD))
     rest = gaussian_filter(square / draws, _SMOOTH_VERTICES, mode="nearest")
-    return np.sqrt(rest + np.maximum(of_both, 0.0))
+    return np.sqrt(rest + np.sum(shared**2, axis=-1)), shared
 
 
 def rise_of(shape: tuple[int, int, int]) -> Volume:

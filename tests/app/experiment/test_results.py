@@ -52,6 +52,15 @@ def test_everything_that_a_solver_says_comes_back_from_disk(tmp_path):
         assert data["informed"].attrs["units"] == "1"
 
 
+def test_errors_that_all_places_share_come_back(tmp_path):
+    shared_k = np.stack([solution().temperature_std_k, -solution().temperature_std_k], axis=-1) / 2
+    write_result(tmp_path / "result.nc", replace(solution(), temperature_shared_k=shared_k), {})
+
+    found = read_result(tmp_path / "result.nc")
+
+    np.testing.assert_array_equal(found.temperature_shared_k, shared_k)
+
+
 def test_where_the_measurements_speak_is_drawn():
     drawn = volume_figure(solution(), solution().informed, "informed", highest=1.0)
     assert as_png(drawn).startswith(b"\x89PNG")

@@ -46,16 +46,19 @@ def system(vertical: float) -> System:
 
 
 @pytest.mark.parametrize("vertical", [0.0, 1.0], ids=["the rise is not seen", "it is seen"])
-def test_a_deviation_holds_the_mean_and_the_rise_however_few_the_draws(vertical):
+def test_the_mean_and_the_rise_are_exact_however_few_the_draws(vertical):
     of = system(vertical)
     units = np.eye(120).reshape(120, *SHAPE)
     hessian = np.stack([of.data_terms(n) + of.known_terms(n) + of.smooth(n) for n in units]).reshape(120, 120)
     covariance = np.linalg.inv(hessian)
 
-    found = deviation(of, lambda n: (covariance @ n.ravel()).reshape(SHAPE), 2)
+    found, shared = deviation(of, lambda n: (covariance @ n.ravel()).reshape(SHAPE), 2)
 
     exact = np.sqrt(np.diag(covariance)).reshape(SHAPE)
     assert found.mean(axis=(0, 1)) == pytest.approx(exact.mean(axis=(0, 1)), rel=0.2)
-    rise = rise_of(SHAPE).ravel()
-    rise_std = (rise @ covariance @ rise) ** 0.5
-    assert (rise_std > 0.5) == (vertical == 0.0)
+    rise, mean = rise_of(SHAPE).ravel(), np.full(120, 1 / 120)
+    together = shared.reshape(120, -1)
+    assert (rise @ covariance @ rise > 0.25) == (vertical == 0.0)
+    for of_all in (rise, mean):
+        assert np.sum((of_all @ together) ** 2) == pytest.approx(of_all @ covariance @ of_all)
+    assert (np.sum(shared**2, axis=-1) <= found**2).all()
