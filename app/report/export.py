@@ -89,7 +89,7 @@ def _named_by(output: Path | None) -> ExportFormat:
 
 def _write_csv(path: Path, solution: Solution, derived: Sequence[Derived] = ()) -> None:
     """One row a vertex; the header names quantity and unit."""
-    dataset = to_dataset(replace(solution, departures=None), {}, derived)
+    dataset = to_dataset(replace(solution, departures=None, temperature_shared_k=None), {}, derived)
     table = dataset.to_dataframe().reset_index()
     table.columns = [f"{name} [{dataset[name].attrs['units']}]" for name in table.columns]
     table.to_csv(path, index=False, float_format="%.9g")

@@ -1,6 +1,7 @@
 """A solution as VTK image data (VTI): evenly spaced vertices, T, p, vectors and what follows from them."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,8 @@ def write_vti(
     derived: Sequence[Derived] = (),
     extra: Mapping[str, Float[np.ndarray, "nx ny nz"]] = {},
 ) -> None:
-    """Everything as point data; of a sequence the mean. `extra` are more volumes by name."""
-    dataset = to_dataset(solution, {}, derived)
+    """All that has one value a vertex as point data; of a sequence the mean. `extra` are more volumes by name."""
+    dataset = to_dataset(replace(solution, temperature_shared_k=None), {}, derived)
     points: dict[str, Any] = {
         str(name): np.asfortranarray(dataset[name].to_numpy())
         for name in dataset.data_vars
