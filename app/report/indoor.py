@@ -105,6 +105,7 @@ NAMES: Mapping[str, tuple[str, str]] = {
     "exhaust_temperature": ("exhaust air, temperature", "°C"),
     "heat": ("heat that the air leaves in the room", "W"),
 }
+_TOGETHER = " Errors of T that the whole room is known to share are drawn as that."
 _BY_AGE = ("mean_age", "efficiency", "zone_index", "source_effectiveness")
 NO_VELOCITY = (
     "This result has no velocity: draught, PMV, ADPI, air change, heat and throw are not told. "
@@ -341,6 +342,7 @@ def _notes(
         yield (
             f"Intervals: 95 %, from {asked.samples} samples of the deviations with a correlation length of "
             f"{length_m:.2g} m."
+            f"{_TOGETHER if solution.temperature_shared_k is not None else ''}"
         )
 
 

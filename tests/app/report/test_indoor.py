@@ -142,6 +142,18 @@ def test_a_result_of_temperature_alone_gives_what_it_can():
     assert any("no velocity" in sentence and "standard" in sentence for sentence in found.missing)
 
 
+def test_an_error_that_all_places_share_moves_the_mean_and_no_difference():
+    still = replace(layered(), velocity_m_s=None)
+    std_k = np.full(still.temperature_k.shape, 0.5)
+    found = indoor(replace(still, temperature_std_k=std_k, temperature_shared_k=std_k[..., None]), PLUG_ROOM)
+    by_key = {quantity.key: quantity for quantity in found.quantities}
+    mean, rise = by_key["temperature_mean"], by_key["floor_to_ceiling"]
+    # 32 samples tell a deviation to 13 %; three of those.
+    assert mean.high - mean.low == pytest.approx(2 * 1.96 * 0.5, rel=0.4)
+    assert rise.high - rise.low == pytest.approx(0.0, abs=1e-6)
+    assert any("share" in note for note in found.notes)
+
+
 def test_still_air_says_why_it_has_no_age():
     still = replace(layered(), velocity_m_s=np.zeros((21, 7, 7, 3)))
     found = indoor(still, replace(PLUG_ROOM, boundary=OPENINGS))
