@@ -19,6 +19,8 @@ from core.solve.draft.temperature_system import System, Volume
 _SMOOTH_VERTICES = 1.5
 # The room's mean and its profile's rise.
 BROAD = 2
+# Of the largest variance: what solves to some ten-thousandths do not tell from nothing.
+_ROUGH = 1e-3
 
 
 def deviation(
@@ -26,22 +28,25 @@ def deviation(
 ) -> tuple[Float[np.ndarray, "nx ny nz"], Float[np.ndarray, "nx ny nz errors"]]:
     """One sigma of n from `draws` draws, one at least, and what of it the whole field has together.
 
-    That is one sigma of each of two independent errors, of what goes with the mean and the rise. `solve` inverts the
-    Hessian, roughly.
+    That is one sigma of each of one or two independent errors, of what goes with the mean and the rise. `solve`
+    inverts the Hessian, roughly.
     """
     shape = system.grid.shape
     broad = np.stack([np.full(shape, 1.0 / np.prod(shape)), rise_of(shape)]).reshape(BROAD, -1)
     answers = np.stack([solve(one.reshape(shape)).ravel() for one in broad])
     covariance = broad @ answers.T
-    covariance = (covariance + covariance.T) / 2
-    root = np.linalg.cholesky(covariance)
-    # How n goes with the mean and the rise.
-    with_them = np.linalg.solve(covariance, answers)
+    variances, ways = np.linalg.eigh((covariance + covariance.T) / 2)
+    # Solved only roughly: what is smaller beside the other may be anything, and stays with the draws.
+    told = variances > _ROUGH * variances[-1]
+    broad, answers = ways[:, told].T @ broad, ways[:, told].T @ answers
+    # How n goes with one sigma of each.
+    with_them = answers / np.sqrt(variances[told])[:, None]
     random, square = np.random.default_rng(0), np.zeros(shape)
     for _ in range(draws):
         drawn = solve(_perturbation(system, random)).ravel()
-        square += np.reshape(drawn - (broad @ drawn) @ with_them, shape) ** 2
-    shared = np.reshape(with_them.T @ root, (*shape, BROAD))
+        sigmas = broad @ drawn / np.sqrt(variances[told])
+        square += np.reshape(drawn - sigmas @ with_them, shape) ** 2
+    shared = np.reshape(with_them.T, (*shape, -1))
     rest = gaussian_filter(square / draws, _SMOOTH_VERTICES, mode="nearest")
     return np.sqrt(rest + np.sum(shared**2, axis=-1)), shared
 

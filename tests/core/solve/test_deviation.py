@@ -62,3 +62,11 @@ def test_the_mean_and_the_rise_are_exact_however_few_the_draws(vertical):
     for of_all in (rise, mean):
         assert np.sum((of_all @ together) ** 2) == pytest.approx(of_all @ covariance @ of_all)
     assert (np.sum(shared**2, axis=-1) <= found**2).all()
+
+
+def test_a_rise_that_goes_with_the_mean_alone_is_one_error():
+    tied = (1.0 + np.broadcast_to(np.linspace(-0.5, 0.5, SHAPE[2]), SHAPE)).ravel()
+    found, shared = deviation(system(1.0), lambda n: (tied * (tied @ n.ravel())).reshape(SHAPE), 1)
+    assert shared.shape == (*SHAPE, 1)
+    assert np.abs(shared.ravel()) == pytest.approx(tied)
+    assert found.ravel() == pytest.approx(tied)
