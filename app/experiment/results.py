@@ -15,6 +15,7 @@ _DIMS = ("x", "y", "z")
 # The mark of a variable that follows from T and u.
 _DERIVED = "derived from T and u and their deviations"
 
+# The errors of T that all places share, along x, y, z and error.
 _SHARED = "T_shared"
 # Solution field -> (variable, units, CF standard name or '', long name)
 _VOLUMES = {

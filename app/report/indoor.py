@@ -2,7 +2,7 @@
 
 A result's deviations are sampled as smooth random fields (`core.field_samples`) whose correlation length is a fifth
 of the room's edge: in the packaged room, whose truth is known, the errors of T and u go together over about that.
-What is known to be wrong everywhere alike, as in `draft`, is sampled as that.
+Errors that a result knows to be shared by all places, as one of `draft` does, are drawn for the whole room at once.
 Every figure is worked out again for each sample. Its interval reaches over 95 % of the samples, and over the same
 samples moved so that their median is the found value: where a deviation is larger than the velocity, every sample is
 faster than the found air.
@@ -105,7 +105,7 @@ NAMES: Mapping[str, tuple[str, str]] = {
     "exhaust_temperature": ("exhaust air, temperature", "°C"),
     "heat": ("heat that the air leaves in the room", "W"),
 }
-_TOGETHER = " Errors of T that the whole room is known to share are drawn as that."
+_TOGETHER = " Errors of T that all places share are drawn for the whole room at once."
 _BY_AGE = ("mean_age", "efficiency", "zone_index", "source_effectiveness")
 NO_VELOCITY = (
     "This result has no velocity: draught, PMV, ADPI, air change, heat and throw are not told. "

@@ -19,7 +19,7 @@ from core.solve.draft.temperature_system import System, Volume
 _SMOOTH_VERTICES = 1.5
 # The room's mean and its profile's rise.
 BROAD = 2
-# Of the largest variance: what solves to some ten-thousandths do not tell from nothing.
+# A variance below this share of the larger one is lost in the error of the solves (`_DRAWN` of `temperature`).
 _ROUGH = 1e-3
 
 
@@ -36,7 +36,7 @@ def deviation(
     answers = np.stack([solve(one.reshape(shape)).ravel() for one in broad])
     covariance = broad @ answers.T
     variances, ways = np.linalg.eigh((covariance + covariance.T) / 2)
-    # Solved only roughly: what is smaller beside the other may be anything, and stays with the draws.
+    # What is lost stays with the draws.
     told = variances > _ROUGH * variances[-1]
     broad, answers = ways[:, told].T @ broad, ways[:, told].T @ answers
     # How n goes with one sigma of each.
