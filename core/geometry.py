@@ -74,6 +74,11 @@ class Face:
         return -1 if self.upper else 0
 
     @property
+    def next(self) -> int:
+        """Index of the plane beside it, in the room."""
+        return -2 if self.upper else 1
+
+    @property
     def inward(self) -> float:
         """Sign of a velocity along its axis that enters the room."""
         return -1.0 if self.upper else 1.0

@@ -55,7 +55,7 @@ def outlets_apart_k(
 def _along_wall_k2(box: Box, patch: Patch, room: RoomFields) -> float:
     """Variance along the patch's wall of the air beside it; what leaves is a mean over the patch's heights."""
     face = face_of(patch.wall)
-    beside = np.take(room.excess_k, 1 if face.end == 0 else -2, axis=face.axis)[1:-1]
+    beside = np.take(room.excess_k, face.next, axis=face.axis)[1:-1]
     if face.axis == 2:
         return float(beside[:, 1:-1].var())
     heights_m = np.linspace(box.lower_m[2], box.upper_m[2], beside.shape[1])

@@ -65,25 +65,25 @@ def _stated(flow: FaceFlow, temperature_k: Vertices, scene: Scene) -> Iterator[P
         if isinstance(part, Inlet | Outlet):
             face = face_of(part.patch.wall)
             inside = around(part.patch, *(flow.axes_m[a] for a in face.along))
-            kelvin = _on_faces(temperature_k, face)[inside]
-            yield _passage(f"{part.kind} on {part.patch.wall}", flow.inward(face)[inside], kelvin)
+            kelvin = [of[inside] for of in _at_faces(temperature_k, face)]
+            yield _passage(f"{part.kind} on {part.patch.wall}", flow.inward(face)[inside], *kelvin)
 
 
 def _seen(flow: FaceFlow, temperature_k: Vertices) -> Iterator[Passage]:
     for wall in WALLS:
         face = face_of(wall)
-        inward, kelvin = flow.inward(face), _on_faces(temperature_k, face)
+        inward, kelvin = flow.inward(face), _at_faces(temperature_k, face)
         for kind, through in (("inlet", inward > 0), ("outlet", inward < 0)):
             if through.any():
-                yield _passage(f"{kind} on {wall}", inward[through], kelvin[through])
+                yield _passage(f"{kind} on {wall}", inward[through], *(of[through] for of in kelvin))
 
 
-def _passage(name: str, inward_m3_s: np.ndarray, kelvin: np.ndarray) -> Passage:
-    """Supply air has one temperature, read where it is not smeared with the wall's; leaving air has its mean."""
+def _passage(name: str, inward_m3_s: np.ndarray, at_wall_k: np.ndarray, inside_k: np.ndarray) -> Passage:
+    """Supply air has one temperature, read where it is not smeared with the wall's; leaving air has that inside."""
     total = float(inward_m3_s.sum())
-    weights = np.abs(inward_m3_s)
+    weights, kelvin = np.abs(inward_m3_s), inside_k
     if total > 0:
-        weights = np.where(weights >= _UNSMEARED * weights.max(), weights, 0.0)
+        weights, kelvin = np.where(weights >= _UNSMEARED * weights.max(), weights, 0.0), at_wall_k
     return Passage(name, total, float(np.average(kelvin, weights=weights)) if weights.any() else float("nan"))
 
 
@@ -95,5 +95,11 @@ def _mean_k(passages: Sequence[Passage], sign: float) -> float:
     return float(np.average([p.temperature_k for p in those], weights=[abs(p.inward_m3_s) for p in those]))
 
 
-def _on_faces(temperature_k: Vertices, face: Face) -> np.ndarray:
-    return corner_mean(np.take(np.asarray(temperature_k, np.float64), face.end, axis=face.axis), (0, 1))
+def _at_faces(temperature_k: Vertices, face: Face) -> tuple[np.ndarray, np.ndarray]:
+    """T at a wall's faces: on the wall, and one vertex before it.
+
+    Around an opening the wall's vertices have its surface's temperature, which no air that leaves has.
+    """
+    planes = (np.take(np.asarray(temperature_k, np.float64), n, axis=face.axis) for n in (face.end, face.next))
+    on_wall, before = (corner_mean(plane, (0, 1)) for plane in planes)
+    return on_wall, before

@@ -19,7 +19,9 @@ def scene(*boundary) -> Scene:
 
 def test_the_heat_of_a_plug_is_its_flow_times_its_difference():
     found = plug(8)
-    temperature_k = np.broadcast_to(np.linspace(299.0, 295.0, 9)[:, None, None], (9, 7, 7))
+    # Air leaves as warm as it is before the outlet.
+    along_k = np.interp(np.arange(9), (0, 7), (299.0, 295.0))
+    temperature_k = np.broadcast_to(along_k[:, None, None], (9, 7, 7))
     air = exchange(face_flow(found), temperature_k, scene())
     # 0.1 m/s through 6 m2; dry air of 20 C and 101325 Pa has 1.2041 kg/m3.
     assert air.flow_m3_s == pytest.approx(0.6)
@@ -50,3 +52,15 @@ def test_supply_air_is_read_where_the_wall_does_not_smear_it():
     )
     air = exchange(face_flow(warm, opening_patches(stated)), temperature_k, stated)
     assert air.supply_k == pytest.approx(290.0, abs=1e-9)
+
+
+def test_leaving_air_is_not_as_cold_as_the_wall_around_its_outlet():
+    found = ventilated()
+    cold = np.full((13, 13, 13), 295.0)
+    # Also at the outlet's edge, which a wall's vertices share.
+    cold[0], cold[-1] = 290.0, 280.0
+    stated = scene(
+        Inlet(patch=INLET, temperature_k=290.0, velocity_m_s=(0.2, 0.0, 0.0)), Outlet(patch=OUTLET)
+    )
+    air = exchange(face_flow(box(found.velocity_m_s, cold), opening_patches(stated)), cold, stated)
+    assert (air.supply_k, air.exhaust_k) == pytest.approx((290.0, 295.0))
