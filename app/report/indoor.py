@@ -2,7 +2,7 @@
 
 A result's deviations are sampled as smooth random fields (`core.field_samples`) whose correlation length is a fifth
 of the room's edge: in the packaged room, whose truth is known, the errors of T and u go together over about that.
-Errors that a result knows to be shared by all places, as one of `draft` does, are drawn for the whole room at once.
+Errors of T that all places share (`Solution.temperature_shared_k`) are drawn for the whole room at once.
 Every figure is worked out again for each sample. Its interval reaches over 95 % of the samples, and over the same
 samples moved so that their median is the found value: where a deviation is larger than the velocity, every sample is
 faster than the found air.

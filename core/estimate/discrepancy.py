@@ -56,12 +56,13 @@ class Correction(eqx.Module):
     """The correction on vertices, and its prior and posterior variance; one vertex along an axis without change.
 
     `point_k2` is the variance of one point about what views see. `level_std_k` is the posterior deviation of the
-    mean over the room.
+    mean over the room. `with_profile_k` are errors that go with that of the profile, one sigma each, independent.
     """
 
     excess_k: Float[np.ndarray, "vx vy vz"]
     prior_variance_k2: Float[np.ndarray, "vx vy vz"]
     variance_k2: Float[np.ndarray, "vx vy vz"]
+    with_profile_k: Float[np.ndarray, "errors vx vy vz"]
     point_k2: float
     level_std_k: float
 
@@ -120,10 +121,12 @@ def temperature_correction(
     prior, point_k2 = prior_k2(std_k), _unseen_share(parts) * std_k**2
     fitted = _fit(kinds, prior, errors, point_k2)
     size = sum(len(basis) for basis in bases)
-    before, after = (_variance(bases, c[:size, :size]) for c in (prior, fitted.covariance))
+    covariance = fitted.covariance[:size, :size]
+    before, after = (_variance(bases, c) for c in (prior[:size, :size], covariance))
     level = np.concatenate([basis.mean((1, 2, 3)) for basis in bases])
-    level_std_k = float(np.sqrt(level @ fitted.covariance[:size, :size] @ level))
-    return Correction(_field(bases, fitted.mean[:size]), before, after, point_k2, level_std_k)
+    level_std_k = float(np.sqrt(level @ covariance @ level))
+    with_profile_k = _going_with(len(bases[0]), bases, covariance)
+    return Correction(_field(bases, fitted.mean[:size]), before, after, with_profile_k, point_k2, level_std_k)
 
 
 def _parts(scene: Scene) -> list[_Part]:
@@ -171,6 +174,18 @@ def _variance(
     values, vectors = np.linalg.eigh(covariance)
     roots = (vectors * np.sqrt(np.maximum(values, 0.0))).T
     return np.asarray(sum(np.square(_field(bases, root)) for root in roots))
+
+
+def _going_with(
+    first: int,
+    bases: list[Float[np.ndarray, "functions _ _ _"]],
+    covariance: Float[np.ndarray, "unknowns unknowns"],
+) -> Float[np.ndarray, "errors vx vy vz"]:
+    """Independent errors of the `first` coefficients, with what the others are expected to be wrong by then."""
+    values, vectors = np.linalg.eigh(covariance[:first, :first])
+    # covariance @ vectors / values: the regression of all coefficients on these.
+    errors = covariance[:, :first] @ (vectors / np.sqrt(values))
+    return np.stack([_field(bases, error) for error in errors.T])
 
 
 def _kinds(

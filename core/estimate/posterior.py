@@ -27,7 +27,7 @@ from core.estimate.temperature_levels import (
     layer_means,
     surfaces_std_k,
 )
-from core.estimate.uncertainty import Deviation, deviation
+from core.estimate.uncertainty import Deviation, deviation, errors_of, principal
 from core.problem import Problem
 from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
@@ -98,6 +98,7 @@ def solution(
         pressure.std,
         velocity.std,
         temperature.informed,
+        temperature_shared_k=_shared_k(analysis, change.with_profile_k * free, _DOUBT * moved_k * free),
         outcome=analysis.best.flow.outcome,
         solver_s=seconds,
         notes=(*notes, *sentences(analysis, error, doubt, moved_k, change.level_std_k)),
@@ -167,6 +168,17 @@ def hydrostatic_variance_m4_s4(
 def rms(field: Float[np.ndarray, "..."]) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(np.square(field))))
+
+
+def _shared_k(
+    analysis: Analysis,
+    with_profile_k: Float[np.ndarray, "errors vx vy vz"],
+    level_k: Float[np.ndarray, "vx vy vz"],
+) -> Float[np.ndarray, "vx vy vz parts"]:
+    """Errors of T that all places have together: those of the parameters, of the profile, and of the level."""
+    slopes = analysis.derivatives.per_deviation(lambda run: run.excess_k)
+    of_parameters_k = errors_of(slopes, analysis.posterior.covariance)
+    return principal(np.concatenate([of_parameters_k, with_profile_k, level_k[None]]))
 
 
 def _deviation(

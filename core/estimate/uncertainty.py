@@ -12,6 +12,9 @@ from jaxtyping import Float
 
 Field = Float[np.ndarray, "vx vy vz ..."]
 
+# A shared error with less of their variance goes with the errors that are not shared.
+_LEAST_SHARE = 0.01
+
 
 class Deviation(eqx.Module):
     """One sigma on vertices, and the share of the prior variance that the measurements removed (0 to 1)."""
@@ -30,10 +33,24 @@ def deviation(
 
     `extra` are the correction's prior and posterior variances.
     """
-    roots = np.linalg.cholesky(covariance)
-    after = np.sum(np.tensordot(roots.T, derivatives, axes=1) ** 2, axis=0) + extra[1]
+    after = np.sum(errors_of(derivatives, covariance) ** 2, axis=0) + extra[1]
     before = np.sum(derivatives**2, axis=0) + extra[0]
     # Where nothing is uncertain, `informed` is 0.
     left = np.square(model_std) + np.finfo(np.float32).tiny
     informed = 1.0 - (after + left) / (before + left)
     return Deviation(np.sqrt(after + left), np.clip(informed, 0.0, 1.0))
+
+
+def errors_of(
+    derivatives: Float[np.ndarray, "active vx vy vz ..."], covariance: Float[np.ndarray, "active active"]
+) -> Float[np.ndarray, "active vx vy vz ..."]:
+    """What parameters of this covariance have wrong: independent errors of a field, one sigma each."""
+    return np.tensordot(np.linalg.cholesky(covariance).T, derivatives, axes=1)
+
+
+def principal(errors: Float[np.ndarray, "errors vx vy vz"]) -> Float[np.ndarray, "vx vy vz parts"]:
+    """The principal parts of independent errors, the largest first; parts that matter little are left out."""
+    flat = errors.reshape(len(errors), -1)
+    variances, ways = np.linalg.eigh(flat @ flat.T)
+    kept = np.flatnonzero(variances > _LEAST_SHARE * variances.sum())[::-1]
+    return (ways[:, kept].T @ flat).T.reshape(*errors.shape[1:], len(kept))

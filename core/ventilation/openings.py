@@ -100,6 +100,8 @@ def _at_faces(temperature_k: Vertices, face: Face) -> tuple[np.ndarray, np.ndarr
 
     Around an opening the wall's vertices have its surface's temperature, which no air that leaves has.
     """
-    planes = (np.take(np.asarray(temperature_k, np.float64), n, axis=face.axis) for n in (face.end, face.next))
+    planes = (
+        np.take(np.asarray(temperature_k, np.float64), n, axis=face.axis) for n in (face.end, face.next)
+    )
     on_wall, before = (corner_mean(plane, (0, 1)) for plane in planes)
     return on_wall, before

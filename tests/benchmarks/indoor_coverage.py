@@ -22,10 +22,15 @@ from app.report.indoor import indoor
 from app.report.maps import derived_maps
 from app.volume.file import RoomVolume
 from app.volume.misread import misread
+from app.volume.scene import RigOptions, room_scene
 from app.volume.score import coverage, score_solution, truth_at
+from core.comfort import CELSIUS_K
 from core.metrics import inner
 from core.result import Solution
+from core.scene import Inlet, Outlet, Scene
 from core.solve.room import RoomSettings, solve_room
+from core.ventilation.face_flow import found_flow
+from core.ventilation.openings import exchange, heat_capacity_j_m3_k, opening_patches
 
 # A figure is held where the truth lies beyond its interval by less than the last digit that is told.
 _DIGITS = 1e-3
@@ -38,6 +43,23 @@ def of_the_truth(truth: RoomVolume, found: Solution) -> Solution:
     return Solution(found.x_m, found.y_m, found.z_m, kelvin, velocity_m_s=velocity)
 
 
+def _by_its_outlets(true: Solution, truth: RoomVolume) -> dict[str, float]:
+    """What leaves has the temperature inside the outlets: faces beside them, which share the flow, are colder."""
+    scene = room_scene(truth, RigOptions(), "surveyed")
+    air = exchange(found_flow(true.filled(), opening_patches(scene)), true.temperature_k, scene)
+    leaving = [p for p in zip(_openings(scene), air.passages, strict=True) if isinstance(p[0], Outlet)]
+    flows = np.array([max(-passage.inward_m3_s, 0.0) for _, passage in leaving])
+    if not flows.any():
+        return {}
+    exhaust_k = float(np.average([outlet.mean_temperature_k for outlet, _ in leaving], weights=flows))
+    heat_w = heat_capacity_j_m3_k(scene.air) * air.flow_m3_s * (air.supply_k - exhaust_k)
+    return {"exhaust_temperature": exhaust_k - CELSIUS_K, "heat": heat_w}
+
+
+def _openings(scene: Scene) -> list[Inlet | Outlet]:
+    return [part for part in scene.boundary if isinstance(part, Inlet | Outlet)]
+
+
 def row_of(found: Solution, truth: RoomVolume, scene) -> dict:
     """Shares of points held, and the table's figures that are not."""
     true = of_the_truth(truth, found)
@@ -47,7 +69,7 @@ def row_of(found: Solution, truth: RoomVolume, scene) -> dict:
         if one.low is not None and one.high is not None:
             value, slack = true_maps[one.name], _DIGITS * float(np.ptp(one.values))
             held[one.name] = float(np.mean(inner((value >= one.low - slack) & (value <= one.high + slack))))
-    real = {one.key: one.value for one in indoor(true, scene).quantities}
+    real = {one.key: one.value for one in indoor(true, scene).quantities} | _by_its_outlets(true, truth)
     table = [one for one in indoor(found, scene).quantities if one.low is not None and one.key in real]
     missed = {
         one.key: [real[one.key], one.low, one.high]
