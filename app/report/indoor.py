@@ -224,11 +224,16 @@ def _in_the_zone(solution: Solution, scene: Scene, asked: IndoorAsked) -> Figure
 
 def _heights(solution: Solution, there: np.ndarray) -> Figures:
     """Differences between heights: over the zone's footprint, and of the whole room."""
-    head, ankle = (at_height(solution.temperature_k, solution.z_m, height) for height in (HEAD_M, ANKLE_M))
+    # Vertices on a wall have its surface's temperature, which is not the air's: that follows from the two before it.
+    air_k = np.array(solution.temperature_k)
+    for wall, before, farther in ((0, 1, 2), (-1, -2, -3)):
+        air_k[:, :, wall] = 2.0 * air_k[:, :, before] - air_k[:, :, farther]
+    head, ankle, top = (
+        at_height(air_k, solution.z_m, height)
+        for height in (HEAD_M, ANKLE_M, solution.z_m[-1] - solution.z_m[0] - ANKLE_M)
+    )
     upwards_k = np.asarray(head - ankle, np.float64)[there.any(axis=2)]
     upwards_k = upwards_k[~np.isnan(upwards_k)]
-    # Vertices on a wall have its surface's temperature, which is not the air's.
-    top = at_height(solution.temperature_k, solution.z_m, solution.z_m[-1] - solution.z_m[0] - ANKLE_M)
     low_k, high_k = (float(np.nanmean(plane[1:-1, 1:-1].astype(np.float64))) for plane in (ankle, top))
     return {
         "head_to_ankle": float(upwards_k.mean()),
