@@ -21,6 +21,7 @@ from app.volume.score import coverage, score_solution
 from core.geometry import WallName
 from core.motion import MOTIONS, CameraMotion
 from core.problem import Problem, ShiftMeasurement
+from core.result import Solution
 from core.scene import FlowModel, Inlet, Scene
 from core.solve.room import RoomSettings, solve_room
 
@@ -80,7 +81,7 @@ def register(bench: typer.Typer) -> None:
                     "closure": closure,
                     "images": images,
                 }
-                row |= {"cells": cells} | fit_row(problem, volume, settings)
+                row |= {"cells": cells} | scores_of(*solved(problem, settings), volume)
                 typer.echo(json.dumps(row) if as_json else _sentence(row))
 
 
@@ -139,11 +140,15 @@ def mistaken(inlet: Inlet, wrong: float, ambient_k: float) -> Inlet:
     return replace(inlet, temperature_k=temperature_k, velocity_m_s=(x, y, z))
 
 
-def fit_row(problem: Problem, volume: RoomVolume, settings: RoomSettings) -> dict[str, Any]:
-    """Solve; errors, coverage, processor seconds, and what was said."""
+def solved(problem: Problem, settings: RoomSettings) -> tuple[Solution, float]:
+    """The solution, and the processor seconds that it took."""
     began_s = time.process_time()
     solution = solve_room(problem, settings)
-    cpu_s = time.process_time() - began_s
+    return solution, time.process_time() - began_s
+
+
+def scores_of(solution: Solution, cpu_s: float, volume: RoomVolume) -> dict[str, Any]:
+    """Errors, coverage, what was found of the supplies, and what was said."""
     scores = score_solution(solution, volume)
     return {
         "u_rel": scores["u"]["rel"],

@@ -56,15 +56,21 @@ class Correction(eqx.Module):
     """The correction on vertices, and its prior and posterior variance; one vertex along an axis without change.
 
     `point_k2` is the variance of one point about what views see. `level_std_k` is the posterior deviation of the
-    mean over the room. `with_profile_k` are errors that go with that of the profile, one sigma each, independent.
+    mean over the room. `bases` and `covariance_k2` are those of the posterior's coefficients.
     """
 
     excess_k: Float[np.ndarray, "vx vy vz"]
     prior_variance_k2: Float[np.ndarray, "vx vy vz"]
     variance_k2: Float[np.ndarray, "vx vy vz"]
-    with_profile_k: Float[np.ndarray, "errors vx vy vz"]
     point_k2: float
     level_std_k: float
+    bases: list[Float[np.ndarray, "functions _ _ _"]]
+    covariance_k2: Float[np.ndarray, "coefficients coefficients"]
+
+    def goes_with(self, weights: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, "vx vy vz"]:
+        """Covariance of the error at each vertex with that of a weighted sum over vertices."""
+        taken = np.concatenate([_sums(basis, weights) for basis in self.bases])
+        return np.broadcast_to(_field(self.bases, self.covariance_k2 @ taken), weights.shape)
 
 
 class _Residuals(eqx.Module):
@@ -125,8 +131,8 @@ def temperature_correction(
     before, after = (_variance(bases, c) for c in (prior[:size, :size], covariance))
     level = np.concatenate([basis.mean((1, 2, 3)) for basis in bases])
     level_std_k = float(np.sqrt(level @ covariance @ level))
-    with_profile_k = _going_with(len(bases[0]), bases, covariance)
-    return Correction(_field(bases, fitted.mean[:size]), before, after, with_profile_k, point_k2, level_std_k)
+    change = _field(bases, fitted.mean[:size])
+    return Correction(change, before, after, point_k2, level_std_k, bases, covariance)
 
 
 def _parts(scene: Scene) -> list[_Part]:
@@ -176,16 +182,12 @@ def _variance(
     return np.asarray(sum(np.square(_field(bases, root)) for root in roots))
 
 
-def _going_with(
-    first: int,
-    bases: list[Float[np.ndarray, "functions _ _ _"]],
-    covariance: Float[np.ndarray, "unknowns unknowns"],
-) -> Float[np.ndarray, "errors vx vy vz"]:
-    """Independent errors of the `first` coefficients, with what the others are expected to be wrong by then."""
-    values, vectors = np.linalg.eigh(covariance[:first, :first])
-    # covariance @ vectors / values: the regression of all coefficients on these.
-    errors = covariance[:, :first] @ (vectors / np.sqrt(values))
-    return np.stack([_field(bases, error) for error in errors.T])
+def _sums(
+    basis: Float[np.ndarray, "functions _ _ _"], weights: Float[np.ndarray, "vx vy vz"]
+) -> Float[np.ndarray, " functions"]:
+    """Weighted sum over vertices of each function; one vertex along an axis stands for all."""
+    constant = tuple(a for a in range(3) if basis.shape[1 + a] == 1)
+    return np.tensordot(basis, weights.sum(axis=constant, keepdims=True), axes=3)
 
 
 def _kinds(

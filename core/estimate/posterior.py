@@ -15,6 +15,7 @@ from core.estimate.diagnostics import (
     other_way,
     undetermined,
 )
+from core.estimate.discrepancy import Correction
 from core.estimate.explained import explained, likeness
 from core.estimate.forward_runs import Derivatives, ForwardRun
 from core.estimate.least_squares import Posterior
@@ -27,11 +28,12 @@ from core.estimate.temperature_levels import (
     layer_means,
     surfaces_std_k,
 )
-from core.estimate.uncertainty import Deviation, deviation, errors_of, principal
+from core.estimate.uncertainty import Deviation, deviation, errors_of
 from core.problem import Problem
 from core.result import Solution
 from core.room.boundary_conditions import RoomLayout
 from core.room.vertices import RoomFields
+from core.shared_errors import broad, shared_errors
 
 # If the thermometers moved the level of T, half of that move is added to its standard deviation: they stand in a few
 # places, and the model was wrong there.
@@ -98,7 +100,7 @@ def solution(
         pressure.std,
         velocity.std,
         temperature.informed,
-        temperature_shared_k=_shared_k(analysis, change.with_profile_k * free, _DOUBT * moved_k * free),
+        temperature_shared_k=_shared_k(analysis, change, _DOUBT * moved_k, free),
         outcome=analysis.best.flow.outcome,
         solver_s=seconds,
         notes=(*notes, *sentences(analysis, error, doubt, moved_k, change.level_std_k)),
@@ -171,14 +173,18 @@ def rms(field: Float[np.ndarray, "..."]) -> float:
 
 
 def _shared_k(
-    analysis: Analysis,
-    with_profile_k: Float[np.ndarray, "errors vx vy vz"],
-    level_k: Float[np.ndarray, "vx vy vz"],
-) -> Float[np.ndarray, "vx vy vz parts"]:
-    """Errors of T that all places have together: those of the parameters, of the profile, and of the level."""
+    analysis: Analysis, change: Correction, level_k: float, free: Float[np.ndarray, "vx vy vz"]
+) -> Float[np.ndarray, "vx vy vz errors"]:
+    """Errors of T that all places have together: of the parameters, of the last correction, and of its level."""
     slopes = analysis.derivatives.per_deviation(lambda run: run.excess_k)
-    of_parameters_k = errors_of(slopes, analysis.posterior.covariance)
-    return principal(np.concatenate([of_parameters_k, with_profile_k, level_k[None]]))
+    known = errors_of(slopes, analysis.posterior.covariance)
+    independent = np.concatenate([known, level_k * free[None]])
+    rows = [
+        np.tensordot(np.tensordot(independent, weights, axes=3), independent, axes=1)
+        + free * change.goes_with(free * weights)
+        for weights in broad(free.shape)
+    ]
+    return np.moveaxis(shared_errors(np.stack(rows)).fields, 0, -1)
 
 
 def _deviation(

@@ -12,9 +12,6 @@ from jaxtyping import Float
 
 Field = Float[np.ndarray, "vx vy vz ..."]
 
-# A shared error with less of their variance goes with the errors that are not shared.
-_LEAST_SHARE = 0.01
-
 
 class Deviation(eqx.Module):
     """One sigma on vertices, and the share of the prior variance that the measurements removed (0 to 1)."""
@@ -46,11 +43,3 @@ def errors_of(
 ) -> Float[np.ndarray, "active vx vy vz ..."]:
     """What parameters of this covariance have wrong: independent errors of a field, one sigma each."""
     return np.tensordot(np.linalg.cholesky(covariance).T, derivatives, axes=1)
-
-
-def principal(errors: Float[np.ndarray, "errors vx vy vz"]) -> Float[np.ndarray, "vx vy vz parts"]:
-    """The principal parts of independent errors, the largest first; parts that matter little are left out."""
-    flat = errors.reshape(len(errors), -1)
-    variances, ways = np.linalg.eigh(flat @ flat.T)
-    kept = np.flatnonzero(variances > _LEAST_SHARE * variances.sum())[::-1]
-    return (ways[:, kept].T @ flat).T.reshape(*errors.shape[1:], len(kept))

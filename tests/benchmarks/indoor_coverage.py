@@ -27,7 +27,7 @@ from app.volume.score import coverage, score_solution, truth_at
 from core.comfort import CELSIUS_K
 from core.metrics import inner
 from core.result import Solution
-from core.scene import Inlet, Outlet, Scene
+from core.scene import Inlet, Outlet
 from core.solve.room import RoomSettings, solve_room
 from core.ventilation.face_flow import found_flow
 from core.ventilation.openings import exchange, heat_capacity_j_m3_k, opening_patches
@@ -43,21 +43,30 @@ def of_the_truth(truth: RoomVolume, found: Solution) -> Solution:
     return Solution(found.x_m, found.y_m, found.z_m, kelvin, velocity_m_s=velocity)
 
 
-def _by_its_outlets(true: Solution, truth: RoomVolume) -> dict[str, float]:
-    """What leaves has the temperature inside the outlets: faces beside them, which share the flow, are colder."""
+def _as_stated(true: Solution, truth: RoomVolume) -> dict[str, float]:
+    """Of a truth that was computed: what its case states of supplies, and what leaves inside its outlets.
+
+    Read off vertices, an opening that is two of them wide has a part of its wall's temperature.
+    """
     scene = room_scene(truth, RigOptions(), "surveyed")
+    parts = [part for part in scene.boundary if isinstance(part, Inlet | Outlet)]
     air = exchange(found_flow(true.filled(), opening_patches(scene)), true.temperature_k, scene)
-    leaving = [p for p in zip(_openings(scene), air.passages, strict=True) if isinstance(p[0], Outlet)]
-    flows = np.array([max(-passage.inward_m3_s, 0.0) for _, passage in leaving])
-    if not flows.any():
-        return {}
-    exhaust_k = float(np.average([outlet.mean_temperature_k for outlet, _ in leaving], weights=flows))
-    heat_w = heat_capacity_j_m3_k(scene.air) * air.flow_m3_s * (air.supply_k - exhaust_k)
-    return {"exhaust_temperature": exhaust_k - CELSIUS_K, "heat": heat_w}
-
-
-def _openings(scene: Scene) -> list[Inlet | Outlet]:
-    return [part for part in scene.boundary if isinstance(part, Inlet | Outlet)]
+    supplies = [(p.temperature_k, p.inward_m_s * p.patch.area_m2) for p in parts if isinstance(p, Inlet)]
+    leaving = [
+        (part.mean_temperature_k, max(-passage.inward_m3_s, 0.0))
+        for part, passage in zip(parts, air.passages, strict=True)
+        if isinstance(part, Outlet)
+    ]
+    (supply_k, flow_m3_s), (exhaust_k, _) = (
+        (np.average(kelvin, weights=flows), sum(flows))
+        for kelvin, flows in (np.array(openings, float).T for openings in (supplies, leaving))
+    )
+    return {
+        "flow": 3600.0 * flow_m3_s,
+        "supply_temperature": supply_k - CELSIUS_K,
+        "exhaust_temperature": exhaust_k - CELSIUS_K,
+        "heat": heat_capacity_j_m3_k(scene.air) * flow_m3_s * (supply_k - exhaust_k),
+    }
 
 
 def row_of(found: Solution, truth: RoomVolume, scene) -> dict:
@@ -69,7 +78,7 @@ def row_of(found: Solution, truth: RoomVolume, scene) -> dict:
         if one.low is not None and one.high is not None:
             value, slack = true_maps[one.name], _DIGITS * float(np.ptp(one.values))
             held[one.name] = float(np.mean(inner((value >= one.low - slack) & (value <= one.high + slack))))
-    real = {one.key: one.value for one in indoor(true, scene).quantities} | _by_its_outlets(true, truth)
+    real = {one.key: one.value for one in indoor(true, scene).quantities} | _as_stated(true, truth)
     table = [one for one in indoor(found, scene).quantities if one.low is not None and one.key in real]
     missed = {
         one.key: [real[one.key], one.low, one.high]

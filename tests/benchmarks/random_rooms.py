@@ -27,7 +27,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from app.bench.room_fit import fit_row, mistaken, problem_of
+from app.bench.room_fit import mistaken, problem_of, scores_of, solved
 from app.reconstruct.problem import with_scene
 from app.volume.file import read_volume
 from app.volume.misread import misread
@@ -42,6 +42,7 @@ from core.room.march import MarchSettings, march
 from core.scene import Inlet, Outlet
 from core.solve.room import RoomSettings
 from tests.benchmarks.foam_rooms import MODELS, computed
+from tests.benchmarks.indoor_coverage import row_of as indoor_row
 from tests.benchmarks.other_rooms import T0_K, Made, marched
 
 _SEED = 2611
@@ -171,8 +172,10 @@ def row_of(
     stated = what.heater is not None and (information == "surveyed" or number % 4 >= 2)
     # A surveyed room has its heater already.
     add = stated and information == "operator"
+    exact = problem.scene
     problem = _entered(problem, number, heater_of(read_volume(path)) if add else None, wrong)
-    fit = fit_row(problem, volume, RoomSettings(cells=cells))
+    solution, cpu_s = solved(problem, RoomSettings(cells=cells))
+    fit = scores_of(solution, cpu_s, volume)
     said = " ".join(fit["notes"])
     carried_k = inner(volume.temperature_k[:1] - volume.temperature_k)
     return {
@@ -188,6 +191,7 @@ def row_of(
         "carried_T_air_rms_k": rms(off_walls(volume.temperature_k[:1] - volume.temperature_k)),
         "distrusts": "distrust the velocity" in said,
         "checks": "Check it" in said,
+        **indoor_row(replace(solution, history=()), volume, exact),
     }
 
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from core.shared_errors import rise_of
 from core.significance import TO_ONE_SIDE
-from core.solve.draft.temperature_deviation import rise_of
 from core.solve.draft.temperature_system import System, Volume
 
 

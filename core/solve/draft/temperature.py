@@ -33,10 +33,11 @@ from core.rays.visibility import away_from_walls
 from core.result import Outcome, Solution
 from core.scene import ProjectedPattern
 from core.setting import SettingError
+from core.shared_errors import BROAD
 from core.solve.draft.conjugate_gradients import Product, conjugate_gradients
 from core.solve.draft.front_layers import front_layers_px
 from core.solve.draft.stratification import upside_down
-from core.solve.draft.temperature_deviation import BROAD, deviation
+from core.solve.draft.temperature_deviation import deviation
 from core.solve.draft.temperature_prior import (
     TemperatureSettings,
     data_weight,

@@ -14,11 +14,10 @@ from jaxtyping import Float
 from scipy.fft import idctn
 from scipy.ndimage import gaussian_filter
 
+from core.shared_errors import broad, shared_errors
 from core.solve.draft.temperature_system import System, Volume
 
 _SMOOTH_VERTICES = 1.5
-# The room's mean and its profile's rise.
-BROAD = 2
 # A variance below this share of the larger one is lost in the error of the solves (`_DRAWN` of `temperature`).
 _ROUGH = 1e-3
 
@@ -28,34 +27,17 @@ def deviation(
 ) -> tuple[Float[np.ndarray, "nx ny nz"], Float[np.ndarray, "nx ny nz errors"]]:
     """One sigma of n from `draws` draws, one at least, and what of it the whole field has together.
 
-    That is one sigma of each of one or two independent errors, of what goes with the mean and the rise. `solve`
-    inverts the Hessian, roughly.
+    That is one sigma of each of one or two independent errors (`core.shared_errors`). `solve` inverts the Hessian,
+    roughly.
     """
     shape = system.grid.shape
-    broad = np.stack([np.full(shape, 1.0 / np.prod(shape)), rise_of(shape)]).reshape(BROAD, -1)
-    answers = np.stack([solve(one.reshape(shape)).ravel() for one in broad])
-    covariance = broad @ answers.T
-    variances, ways = np.linalg.eigh((covariance + covariance.T) / 2)
-    # What is lost stays with the draws.
-    told = variances > _ROUGH * variances[-1]
-    broad, answers = ways[:, told].T @ broad, ways[:, told].T @ answers
-    # How n goes with one sigma of each.
-    with_them = answers / np.sqrt(variances[told])[:, None]
+    shared = shared_errors(np.stack([solve(one) for one in broad(shape)]), _ROUGH)
     random, square = np.random.default_rng(0), np.zeros(shape)
     for _ in range(draws):
-        drawn = solve(_perturbation(system, random)).ravel()
-        sigmas = broad @ drawn / np.sqrt(variances[told])
-        square += np.reshape(drawn - sigmas @ with_them, shape) ** 2
-    shared = np.reshape(with_them.T, (*shape, -1))
+        # What the solves cannot tell apart stays with the draws.
+        square += shared.without(solve(_perturbation(system, random))) ** 2
     rest = gaussian_filter(square / draws, _SMOOTH_VERTICES, mode="nearest")
-    return np.sqrt(rest + np.sum(shared**2, axis=-1)), shared
-
-
-def rise_of(shape: tuple[int, int, int]) -> Volume:
-    """The field whose product with a temperature is its rise from floor to ceiling, by least squares over height."""
-    height = np.linspace(-0.5, 0.5, shape[2])
-    rise = height / (np.sum(height**2) * shape[0] * shape[1])
-    return np.broadcast_to(rise, shape).copy()
+    return np.sqrt(rest + np.sum(shared.fields**2, axis=0)), np.moveaxis(shared.fields, 0, -1)
 
 
 def _perturbation(system: System, random: np.random.Generator) -> Volume:

@@ -1,6 +1,6 @@
 import numpy as np
 
-from core.estimate.uncertainty import deviation, errors_of, principal
+from core.estimate.uncertainty import deviation
 
 SHAPE = (6, 5, 7)
 
@@ -29,22 +29,3 @@ def test_what_the_model_has_wrong_is_added_and_is_not_informed():
     assert alone.informed.max() == 0
     np.testing.assert_allclose(with_one.std**2, 0.4**2 + 0.25, rtol=1e-6)
     assert 0 < with_one.informed.min() < 0.75
-
-
-def test_shared_errors_are_those_of_the_parameters_in_fewer_parts():
-    random = np.random.default_rng(0)
-    slopes = random.standard_normal((4, *SHAPE))
-    slopes[3] = slopes[2] * 1e-3  # says next to nothing of its own
-    covariance = np.diag([1.0, 0.5, 0.1, 0.1])
-
-    parts = principal(errors_of(slopes, covariance))
-
-    assert parts.shape == (*SHAPE, 3)
-    sizes = np.sqrt(np.mean(parts**2, axis=(0, 1, 2)))
-    assert (np.diff(sizes) < 0).all()
-    std = deviation(slopes, covariance, 0.0).std
-    np.testing.assert_allclose(np.sum(parts**2, axis=-1), std**2, rtol=1e-4)
-
-
-def test_a_field_that_is_certain_has_no_shared_errors():
-    assert principal(np.zeros((2, *SHAPE))).shape == (*SHAPE, 0)

@@ -8,7 +8,8 @@ from jaxtyping import Float
 
 from core.geometry import Box
 from core.known_temperature import KnownTemperature, VertexGrid
-from core.solve.draft.temperature_deviation import deviation, rise_of
+from core.shared_errors import rise_of
+from core.solve.draft.temperature_deviation import deviation
 from core.solve.draft.temperature_system import AirPart, System, Volume
 
 SHAPE = (5, 4, 6)
