@@ -30,7 +30,7 @@ from core.field_samples import samples
 from core.geometry import Vector3
 from core.occupied import ANKLE_M, HEAD_M, OccupiedZone, at_height, inside
 from core.result import Solution
-from core.scene import Inlet, Scene
+from core.scene import Inlet, Outlet, Scene
 from core.setting import SettingError, check_range
 from core.ventilation.air_change import AirChange, air_change, source_effectiveness, zone_share
 from core.ventilation.face_flow import FaceFlow, conserved, found_flow
@@ -106,6 +106,10 @@ NAMES: Mapping[str, tuple[str, str]] = {
     "heat": ("heat that the air leaves in the room", "W"),
 }
 _TOGETHER = " Errors of T that all places share are drawn for the whole room at once."
+_BY_AREA = (
+    "What leaves by each outlet is not stated: outlets share it by area. The exhaust's temperature and the heat "
+    "depend on that, and their intervals leave it out: state each outlet's flow."
+)
 _BY_AGE = ("mean_age", "efficiency", "zone_index", "source_effectiveness")
 NO_VELOCITY = (
     "This result has no velocity: draught, PMV, ADPI, air change, heat and throw are not told. "
@@ -342,6 +346,8 @@ def _notes(
             f"Speeds are those of the mean flow; turbulence intensity for the draught rate: "
             f"{100 * TURBULENCE_INTENSITY:g} %. The age's tracer is spread by eddies after Chen and Xu (1998)."
         )
+        if sum(isinstance(part, Outlet) and part.flow_m3_s is None for part in scene.boundary) > 1:
+            yield _BY_AREA
     if solution.temperature_std_k is not None or solution.velocity_std_m_s is not None:
         length_m = LENGTH_SHARE * float(np.prod(scene.room.size_m)) ** (1 / 3)
         yield (

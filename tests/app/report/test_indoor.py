@@ -156,6 +156,19 @@ def test_an_error_that_all_places_share_moves_the_mean_and_no_difference():
     assert any("share" in note for note in found.notes)
 
 
+def test_outlets_that_share_what_leaves_by_area_are_told():
+    found = plug(12)
+    supply, exhaust = OPENINGS
+    second = replace(exhaust, patch=replace(OUTLET, lower_m=(1.0, 1.0), upper_m=(2.0, 1.5)))
+
+    def notes(*outlets: Outlet) -> str:
+        return " ".join(indoor(found, replace(PLUG_ROOM, boundary=(supply, *outlets))).notes)
+
+    assert "outlets share it by area" not in notes(exhaust)
+    assert "outlets share it by area" in notes(exhaust, second)
+    assert "outlets share it by area" not in notes(replace(exhaust, flow_m3_s=0.1), second)
+
+
 def test_still_air_says_why_it_has_no_age():
     still = replace(layered(), velocity_m_s=np.zeros((21, 7, 7, 3)))
     found = indoor(still, replace(PLUG_ROOM, boundary=OPENINGS))
