@@ -1,10 +1,11 @@
-"""Errors that all places of a volume have together: what goes with its mean, and with its rise over the height.
+"""Errors that all places of a volume have together: what goes with its profile over the height.
 
 An interval of a mean over many places is wide if their errors go together and narrow if each is wrong by itself. Of
-a field's covariance C, two rows tell the most of that: with the mean, and with the slope of the profile (b: what
-either takes of each vertex). One standard deviation of each of the two, made independent, moves the whole field by
+a field's covariance C, a few rows tell the most of that: with the mean, with the rise of the profile, and with its
+finer shapes (b: what each takes of every vertex; Legendre's polynomials of the height). One standard deviation of
+each, made independent, moves the whole field by
 
-    C B (B' C B)^-1/2,      B = (b_mean, b_rise)
+    C B (B' C B)^-1/2,      B = (b_mean, b_rise, ...)
 
 and what is left of the variance then is of places by themselves.
 """
@@ -16,9 +17,9 @@ from jaxtyping import Float
 
 Volume = Float[np.ndarray, "nx ny nz"]
 
-# The room's mean and its profile's rise.
+# The mean and the rise alone.
 BROAD = 2
-# A variance below this share of the larger one is lost in the rounding of the rows.
+# A variance below this share of the largest one is lost in the rounding of the rows.
 _ROUNDED = 1e-9
 
 
@@ -35,24 +36,24 @@ class SharedErrors:
         return error - np.tensordot(sigmas, self.fields, axes=1)
 
 
-def broad(shape: tuple[int, int, int]) -> Float[np.ndarray, "2 nx ny nz"]:
-    """What the mean and the rise take of each vertex."""
-    return np.stack([np.full(shape, 1.0 / np.prod(shape)), rise_of(shape)])
+def broad(shape: tuple[int, int, int], count: int = BROAD) -> Float[np.ndarray, "count nx ny nz"]:
+    """What the mean, the rise from floor to ceiling, and finer shapes of the profile take of each vertex.
 
-
-def rise_of(shape: tuple[int, int, int]) -> Volume:
-    """The field whose product with a temperature is its rise from floor to ceiling, by least squares over height."""
-    height = np.linspace(-0.5, 0.5, shape[2])
-    rise = height / (np.sum(height**2) * shape[0] * shape[1])
-    return np.broadcast_to(rise, shape).copy()
-
-
-def shared_errors(rows: Float[np.ndarray, "2 nx ny nz"], rough: float = _ROUNDED) -> SharedErrors:
-    """From the covariance of every vertex with the mean and with the rise: two errors, or fewer.
-
-    An error is left out whose variance is below the share `rough` of the larger one: the rows do not tell it.
+    Each is the factor of its polynomial by least squares over the height; of all but the mean, of half of it.
     """
-    weights = broad(rows.shape[1:])
+    polynomials = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, shape[2]), count - 1)
+    across, scale = np.linalg.qr(polynomials)
+    taken = across / np.diag(scale) / (shape[0] * shape[1])
+    taken[:, 1:] *= 2.0
+    return np.broadcast_to(taken.T[:, None, None], (count, *shape)).copy()
+
+
+def shared_errors(rows: Float[np.ndarray, "count nx ny nz"], rough: float = _ROUNDED) -> SharedErrors:
+    """From the covariance of every vertex with what `broad` takes of all: as many errors, or fewer.
+
+    An error is left out whose variance is below the share `rough` of the largest one: the rows do not tell it.
+    """
+    weights = broad(rows.shape[1:], len(rows))
     covariance = np.tensordot(weights, rows, axes=((1, 2, 3), (1, 2, 3)))
     variances, ways = np.linalg.eigh((covariance + covariance.T) / 2)
     told = variances > max(rough * variances[-1], 0.0)

@@ -7,6 +7,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from core.air import GRAVITY_M_S2
 from core.continuity import left_out
+from core.data_error import LENGTH_SHARE
 from core.estimate.diagnostics import (
     balances,
     contradictions,
@@ -38,6 +39,9 @@ from core.shared_errors import broad, shared_errors
 # If the thermometers moved the level of T, half of that move is added to its standard deviation: they stand in a few
 # places, and the model was wrong there.
 _DOUBT = 0.5
+
+# Shapes of the profile whose errors all places have together: so many correlation lengths are in the height.
+_SHAPES = round(1 / LENGTH_SHARE)
 
 
 class Analysis(eqx.Module):
@@ -182,7 +186,7 @@ def _shared_k(
     rows = [
         np.tensordot(np.tensordot(independent, weights, axes=3), independent, axes=1)
         + free * change.goes_with(free * weights)
-        for weights in broad(free.shape)
+        for weights in broad(free.shape, _SHAPES)
     ]
     return np.moveaxis(shared_errors(np.stack(rows)).fields, 0, -1)
 

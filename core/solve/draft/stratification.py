@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from core.shared_errors import rise_of
+from core.shared_errors import broad
 from core.significance import TO_ONE_SIDE
 from core.solve.draft.temperature_system import System, Volume
 
@@ -14,7 +14,7 @@ def upside_down(temperature_k: Volume, system: System, solve: Callable[[Volume],
 
     `solve` inverts the Hessian of `system`, in which the deviation is counted.
     """
-    slope = rise_of(system.grid.shape)
+    slope = broad(system.grid.shape)[1]
     rise_k = float(np.sum(slope * temperature_k))
     if rise_k >= 0.0:
         return []

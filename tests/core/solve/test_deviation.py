@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from core.geometry import Box
 from core.known_temperature import KnownTemperature, VertexGrid
-from core.shared_errors import rise_of
+from core.shared_errors import broad
 from core.solve.draft.temperature_deviation import deviation
 from core.solve.draft.temperature_system import AirPart, System, Volume
 
@@ -57,7 +57,7 @@ def test_the_mean_and_the_rise_are_exact_however_few_the_draws(vertical):
 
     exact = np.sqrt(np.diag(covariance)).reshape(SHAPE)
     assert found.mean(axis=(0, 1)) == pytest.approx(exact.mean(axis=(0, 1)), rel=0.2)
-    rise, mean = rise_of(SHAPE).ravel(), np.full(120, 1 / 120)
+    mean, rise = broad(SHAPE).reshape(2, 120)
     together = shared.reshape(120, -1)
     assert (rise @ covariance @ rise > 0.25) == (vertical == 0.0)
     for of_all in (rise, mean):
