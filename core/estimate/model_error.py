@@ -75,12 +75,20 @@ class ModelError(eqx.Module):
         """The expected square of the field's error, mean over the room."""
         return float(np.mean(self._variance(name, derivatives)))
 
+    def apart(
+        self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]
+    ) -> list[Float[np.ndarray, "vx vy vz ..."]]:
+        """What each pair differs in and no parameter takes up."""
+        return [
+            getattr(other, name) - getattr(one, name) - np.tensordot(moved, derivatives, axes=1)
+            for (one, other), moved in zip(self.pairs, self.moved, strict=True)
+        ]
+
     def _variance(
         self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]
     ) -> Float[np.ndarray, "vx vy vz ..."]:
         variance = np.zeros(getattr(self.pairs[0][0], name).shape)
-        for (one, other), moved, size in zip(self.pairs, self.moved, self.size, strict=True):
-            apart = getattr(other, name) - getattr(one, name) - np.tensordot(moved, derivatives, axes=1)
+        for apart, size in zip(self.apart(name, derivatives), self.size, strict=True):
             if apart.ndim == 3:
                 # The mean of p at each height follows that of T, of which the last correction knows more.
                 apart = apart - apart.mean((0, 1))

@@ -27,6 +27,7 @@ from core.estimate.temperature_levels import (
     free_vertices,
     last_correction,
     layer_means,
+    layers_k,
     surfaces_std_k,
 )
 from core.estimate.uncertainty import Deviation, deviation, errors_of
@@ -86,9 +87,11 @@ def solution(
     surfaces_k = surfaces_std_k(
         analysis.data, analysis.layout, analysis.best.parameters.wall_excess_k, shown_k
     )
-    of_points = change.point_k2 * free + np.square(surfaces_k)
     error = model_error_of(analysis)
-    # The correction holds what the model has wrong in T.
+    slopes = analysis.derivatives.per_deviation(lambda run: run.excess_k)
+    beside_k = free * layers_k(error.apart("excess_k", slopes))
+    of_points = change.point_k2 * free + np.square(surfaces_k) + np.sum(np.square(beside_k), axis=0)
+    # The correction holds what the model has wrong in T, where a picture can tell.
     temperature = _deviation(analysis, "excess_k", None, (before + of_points, after + of_points))
     pressure = _deviation(analysis, "pressure_m2_s2", error, bent)
     velocity = _deviation(analysis, "velocity_m_s", error)
@@ -104,7 +107,9 @@ def solution(
         pressure.std,
         velocity.std,
         temperature.informed,
-        temperature_shared_k=_shared_k(analysis, change, _DOUBT * moved_k, free),
+        temperature_shared_k=np.concatenate(
+            [_shared_k(analysis, change, _DOUBT * moved_k, free), np.moveaxis(beside_k, 0, -1)], axis=-1
+        ),
         outcome=analysis.best.flow.outcome,
         solver_s=seconds,
         notes=(*notes, *sentences(analysis, error, doubt, moved_k, change.level_std_k)),

@@ -1,10 +1,11 @@
 """How far T, its level, and what leaves by outlets may be off; and the correction of T that follows."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from core.data_error import WALL_MARGIN
 from core.estimate.discrepancy import Correction, temperature_correction
 from core.estimate.explained import explained
 from core.estimate.forward_runs import Derivatives
@@ -81,6 +82,25 @@ def _at_outlets(data: Observations, layers_k: Float[np.ndarray, " vz"]) -> Float
         middle_m = 0.5 * (patch.lower_m[1] + patch.upper_m[1])
         found.append(np.interp(face.place_m(box) if face.axis == 2 else middle_m, heights_m, layers_k))
     return np.array(found, float)
+
+
+def layers_k(apart_k: Sequence[Float[np.ndarray, "vx vy vz"]]) -> Float[np.ndarray, "2 vx vy vz"]:
+    """How wrong T may be beside the floor and beside the ceiling, one sigma of an error each.
+
+    Windows there are left out (`WALL_MARGIN`), so no picture tells how T changes from the layer's edge to the wall.
+    It may be wrong as models differ in that: `apart_k` is what two of them differ in. A layer is much the same all
+    along its wall, so each is one error.
+    """
+    found = []
+    for turned in (slice(None), slice(None, None, -1)):
+        square = 0.0
+        for apart in (one[:, :, turned] for one in apart_k):
+            edge = int(np.ceil(WALL_MARGIN * (apart.shape[2] - 1)))
+            change = apart - apart[:, :, [edge]]
+            change[:, :, edge:] = 0.0
+            square = square + np.square(change[1:-1, 1:-1]).mean((0, 1)) / 2.0
+        found.append(np.broadcast_to(np.sqrt(square)[turned], apart.shape))
+    return np.stack(found)
 
 
 def layer_means(field: Float[np.ndarray, "vx vy vz"]) -> Float[np.ndarray, " vz"]:

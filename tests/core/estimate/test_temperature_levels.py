@@ -10,7 +10,7 @@ import pytest
 from core.estimate.diagnostics import balances
 from core.estimate.observation import observations
 from core.estimate.prior import Prior, room_prior
-from core.estimate.temperature_levels import outlets_apart_k, surfaces_std_k
+from core.estimate.temperature_levels import layers_k, outlets_apart_k, surfaces_std_k
 from core.geometry import WALLS, Box, looking_along_y
 from core.problem import Problem
 from core.room.forward import room
@@ -103,6 +103,23 @@ def test_the_surface_of_a_stated_wall_may_be_off_by_its_stated_deviation():
     # A vertex in the supply; the other walls are adiabatic and show the air.
     assert std_k[0, 4, 4] < 0.1
     assert not std_k[1:].any()
+
+
+def test_beside_floor_and_ceiling_the_air_is_as_uncertain_as_models_differ_from_the_layers_edge_on():
+    # Of 41 vertices over the height those below the third see no window.
+    apart_k = np.zeros((9, 8, 41))
+    apart_k[:, :, 1] = 0.4
+    apart_k[:, :, -2] = -0.3
+    floor, ceiling = layers_k([apart_k, 2.0 * apart_k])
+
+    assert floor[4, 4, 1] == pytest.approx(0.4 * np.sqrt(5 / 2))
+    assert ceiling[4, 4, -2] == pytest.approx(0.3 * np.sqrt(5 / 2))
+    assert not floor[:, :, 3:].any()
+    assert not ceiling[:, :, :-3].any()
+
+
+def test_a_level_in_which_models_differ_is_no_layer():
+    assert not layers_k([np.full((9, 8, 41), 0.7)]).any()
 
 
 @pytest.mark.parametrize(

@@ -455,7 +455,7 @@ def test_a_level_that_thermometers_moved_is_doubted_by_half_of_that(truth: Solut
     assert doubted.temperature_std_k is not None
     assert np.median(own.temperature_std_k[inside]) < 0.5
     assert doubted.temperature_std_k[inside].min() > 0.8
-    # The doubt is of all places together, and none of it is beyond the deviation.
+    # The doubt is of all places together, and nothing that is shared is beyond the deviation.
     assert doubted.temperature_shared_k is not None
     together_k = np.sqrt(np.sum(doubted.temperature_shared_k**2, axis=-1))
     assert together_k[inside].min() > 0.8
