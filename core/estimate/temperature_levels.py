@@ -91,15 +91,14 @@ def layers_k(apart_k: Sequence[Float[np.ndarray, "vx vy vz"]]) -> Float[np.ndarr
     It may be wrong as models differ in that: `apart_k` is what two of them differ in. A layer is much the same all
     along its wall, so each is one error.
     """
+    apart = np.stack(apart_k)
+    edge = int(np.ceil(WALL_MARGIN * (apart.shape[3] - 1)))
     found = []
     for turned in (slice(None), slice(None, None, -1)):
-        square = 0.0
-        for apart in (one[:, :, turned] for one in apart_k):
-            edge = int(np.ceil(WALL_MARGIN * (apart.shape[2] - 1)))
-            change = apart - apart[:, :, [edge]]
-            change[:, :, edge:] = 0.0
-            square = square + np.square(change[1:-1, 1:-1]).mean((0, 1)) / 2.0
-        found.append(np.broadcast_to(np.sqrt(square)[turned], apart.shape))
+        change = apart[..., turned] - apart[..., turned][..., [edge]]
+        change[..., edge:] = 0.0
+        square = np.sum(np.square(change[:, 1:-1, 1:-1]).mean((1, 2)), axis=0) / 2.0
+        found.append(np.broadcast_to(np.sqrt(square)[turned], apart.shape[1:]))
     return np.stack(found)
 
 
