@@ -74,8 +74,8 @@ class Face:
         return -1 if self.upper else 0
 
     @property
-    def next(self) -> int:
-        """Index of the plane beside it, in the room."""
+    def before(self) -> int:
+        """Index of the plane in the room that is next to it: 1 or -2."""
         return -2 if self.upper else 1
 
     @property

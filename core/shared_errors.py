@@ -37,9 +37,10 @@ class SharedErrors:
 
 
 def broad(shape: tuple[int, int, int], count: int = BROAD) -> Float[np.ndarray, "count nx ny nz"]:
-    """What the mean, the rise from floor to ceiling, and finer shapes of the profile take of each vertex.
+    """Weights that read a field's mean, its rise from floor to ceiling, and finer shapes of its profile.
 
-    Each is the factor of its polynomial by least squares over the height; of all but the mean, of half of it.
+    Each is fitted by least squares over the height to what those before it leave. The second is the difference of
+    ceiling and floor; finer shapes are scaled as it is, by twice the factor of their polynomial.
     """
     polynomials = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, shape[2]), count - 1)
     across, scale = np.linalg.qr(polynomials)

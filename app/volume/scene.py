@@ -331,7 +331,7 @@ def _leaving_k(volume: RoomVolume, patch: Patch) -> float:
         (axes[a] >= low_m - 1e-6) & (axes[a] <= high_m + 1e-6)
         for a, low_m, high_m in zip(face.along, lower, upper, strict=True)
     ))  # fmt: skip
-    air_k = np.take(volume.temperature_k, face.next, face.axis)[inside].astype(np.float64)
+    air_k = np.take(volume.temperature_k, face.before, face.axis)[inside].astype(np.float64)
     if air_k.size == 0:
         raise BadInputError(
             f"The outlet {lower} to {upper} m on {patch.wall} lies between the volume's vertices; "

@@ -38,7 +38,7 @@ Pair = tuple[RoomFields, RoomFields]
 
 _STUDENT = 3.0
 # Of the squared difference of two models, what either has wrong.
-_EACH = 0.5
+EACH = 0.5
 # Of the logarithm of k: within e^4 either way.
 _FARTHEST = 4.0
 
@@ -63,7 +63,7 @@ class ModelError(eqx.Module):
     @property
     def moves(self) -> Float[np.ndarray, " active"]:
         """How far what the model has wrong moves each parameter, one standard deviation, in prior deviations."""
-        return np.sqrt(_EACH * np.sum((self.size[:, None] * self.moved) ** 2, axis=0))
+        return np.sqrt(EACH * np.sum((self.size[:, None] * self.moved) ** 2, axis=0))
 
     def deviation(
         self, name: str, derivatives: Float[np.ndarray, "active vx vy vz ..."]
@@ -94,7 +94,7 @@ class ModelError(eqx.Module):
                 apart = apart - apart.mean((0, 1))
             # A mean over one correlation length: one standard deviation to each side.
             width = [0.5 * LENGTH_SHARE * n for n in apart.shape[:3]] + [0.0] * (apart.ndim - 3)
-            variance += size**2 * _EACH * ndimage.gaussian_filter(apart**2, width)
+            variance += size**2 * EACH * ndimage.gaussian_filter(apart**2, width)
         return variance
 
 
@@ -163,4 +163,4 @@ def size_of(
 
 def _unit_power(apart: Float[np.ndarray, "pairs data"]) -> float:
     """Mean square of what a model that is as wrong as the pairs differ would leave of a datum."""
-    return _EACH * float(np.mean(np.sum(apart**2, axis=0)))
+    return EACH * float(np.mean(np.sum(apart**2, axis=0)))

@@ -108,7 +108,8 @@ def solution(
         velocity.std,
         temperature.informed,
         temperature_shared_k=np.concatenate(
-            [_shared_k(analysis, change, _DOUBT * moved_k, free), np.moveaxis(beside_k, 0, -1)], axis=-1
+            [_shared_k(analysis, slopes, change, _DOUBT * moved_k, free), np.moveaxis(beside_k, 0, -1)],
+            axis=-1,
         ),
         outcome=analysis.best.flow.outcome,
         solver_s=seconds,
@@ -182,10 +183,16 @@ def rms(field: Float[np.ndarray, "..."]) -> float:
 
 
 def _shared_k(
-    analysis: Analysis, change: Correction, level_k: float, free: Float[np.ndarray, "vx vy vz"]
+    analysis: Analysis,
+    slopes: Float[np.ndarray, "active vx vy vz"],
+    change: Correction,
+    level_k: float,
+    free: Float[np.ndarray, "vx vy vz"],
 ) -> Float[np.ndarray, "vx vy vz errors"]:
-    """Errors of T that all places have together: of the parameters, of the last correction, and of its level."""
-    slopes = analysis.derivatives.per_deviation(lambda run: run.excess_k)
+    """Errors of T that all places have together: of the parameters, of the last correction, and of its level.
+
+    `slopes` are the derivatives of T, per prior deviation.
+    """
     known = errors_of(slopes, analysis.posterior.covariance)
     independent = np.concatenate([known, level_k * free[None]])
     rows = [

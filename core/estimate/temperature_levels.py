@@ -9,6 +9,7 @@ from core.data_error import WALL_MARGIN
 from core.estimate.discrepancy import Correction, temperature_correction
 from core.estimate.explained import explained
 from core.estimate.forward_runs import Derivatives
+from core.estimate.model_error import EACH
 from core.estimate.observation import Observations
 from core.estimate.prior import Prior
 from core.geometry import WALLS, Box, Face, face_of
@@ -56,7 +57,7 @@ def outlets_apart_k(
 def _along_wall_k2(box: Box, patch: Patch, room: RoomFields) -> float:
     """Variance along the patch's wall of the air beside it; what leaves is a mean over the patch's heights."""
     face = face_of(patch.wall)
-    beside = np.take(room.excess_k, face.next, axis=face.axis)[1:-1]
+    beside = np.take(room.excess_k, face.before, axis=face.axis)[1:-1]
     if face.axis == 2:
         return float(beside[:, 1:-1].var())
     heights_m = np.linspace(box.lower_m[2], box.upper_m[2], beside.shape[1])
@@ -88,8 +89,8 @@ def layers_k(apart_k: Sequence[Float[np.ndarray, "vx vy vz"]]) -> Float[np.ndarr
     """How wrong T may be beside the floor and beside the ceiling, one sigma of an error each.
 
     Windows there are left out (`WALL_MARGIN`), so no picture tells how T changes from the layer's edge to the wall.
-    It may be wrong as models differ in that: `apart_k` is what two of them differ in. A layer is much the same all
-    along its wall, so each is one error.
+    It may be wrong as models differ in that, over sqrt(2): `apart_k` is what each pair of them differs in. A layer is
+    much the same all along its wall, so each is one error.
     """
     apart = np.stack(apart_k)
     edge = int(np.ceil(WALL_MARGIN * (apart.shape[3] - 1)))
@@ -97,7 +98,7 @@ def layers_k(apart_k: Sequence[Float[np.ndarray, "vx vy vz"]]) -> Float[np.ndarr
     for turned in (slice(None), slice(None, None, -1)):
         change = apart[..., turned] - apart[..., turned][..., [edge]]
         change[..., edge:] = 0.0
-        square = np.sum(np.square(change[:, 1:-1, 1:-1]).mean((1, 2)), axis=0) / 2.0
+        square = EACH * np.sum(np.square(change[:, 1:-1, 1:-1]).mean((1, 2)), axis=0)
         found.append(np.broadcast_to(np.sqrt(square)[turned], apart.shape[1:]))
     return np.stack(found)
 

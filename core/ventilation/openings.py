@@ -79,7 +79,7 @@ def _seen(flow: FaceFlow, temperature_k: Vertices) -> Iterator[Passage]:
 
 
 def _passage(name: str, inward_m3_s: np.ndarray, at_wall_k: np.ndarray, inside_k: np.ndarray) -> Passage:
-    """Supply air has one temperature, read where it is not smeared with the wall's; leaving air has that inside."""
+    """Supply air has one temperature, read where it is not smeared with the wall's; leaving air is as inside."""
     total = float(inward_m3_s.sum())
     weights, kelvin = np.abs(inward_m3_s), inside_k
     if total > 0:
@@ -96,12 +96,12 @@ def _mean_k(passages: Sequence[Passage], sign: float) -> float:
 
 
 def _at_faces(temperature_k: Vertices, face: Face) -> tuple[np.ndarray, np.ndarray]:
-    """T at a wall's faces: on the wall, and one vertex before it.
+    """T at a wall's faces: on the wall, and one vertex before it, in the room.
 
-    Around an opening the wall's vertices have its surface's temperature, which no air that leaves has.
+    Around an opening the wall's vertices have its surface's temperature. Air that leaves does not have it.
     """
     planes = (
-        np.take(np.asarray(temperature_k, np.float64), n, axis=face.axis) for n in (face.end, face.next)
+        np.take(np.asarray(temperature_k, np.float64), n, axis=face.axis) for n in (face.end, face.before)
     )
     on_wall, before = (corner_mean(plane, (0, 1)) for plane in planes)
     return on_wall, before
