@@ -271,6 +271,8 @@ class Bench {
   }
 
   async choose(experiment: string, result: string | null = null): Promise<void> {
+    // What was found in a result belongs to the room of its experiment.
+    if (experiment !== this.experiment) this.adding = null;
     this.experiment = experiment;
     [this.captures, this.results, this.result] = [[], [], result];
     await this.attempt("Opening", () => this.refreshExperiment());

@@ -84,18 +84,22 @@ class Draft {
     this.unsaid = [];
     // An answer to a question of before, about another experiment, is not waited for.
     clearTimeout(this.timer);
-    this.asked++;
+    const number = ++this.asked;
+    // Whether another room was opened meanwhile: then this one's answers are not shown.
+    const isLate = () => number !== this.asked;
     if (experiment) {
       try {
         const found = await ask("GET /experiments/{experiment}/answers", { experiment });
+        if (isLate()) return;
         [this.answers, this.unsaid, this.revision] = [found.answers, found.unsaid, found.revision];
         if (bench.adding) this.add("object", bench.adding);
       } catch (error) {
+        if (isLate()) return;
         if (!(error instanceof ProblemError) || error.problem.code !== "bad_input") throw error;
         this.refused = error.problem.cause ?? error.problem.detail;
         return;
       } finally {
-        bench.adding = null;
+        if (!isLate()) bench.adding = null;
       }
     } else {
       this.answers = JSON.parse(localStorage.getItem(KEPT) ?? "{}") as Tree;
