@@ -14,7 +14,8 @@ class Planned {
       return;
     }
     try {
-      this.plan = await ask("GET /experiments/{experiment}/plan", { experiment });
+      const found = await ask("GET /experiments/{experiment}/plan", { experiment });
+      if (experiment === bench.experiment) this.plan = found;
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
       bench.problem = error.problem;
