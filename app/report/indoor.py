@@ -35,7 +35,7 @@ from core.setting import SettingError, check_range
 from core.ventilation.air_change import AirChange, air_change, source_effectiveness, zone_share
 from core.ventilation.face_flow import FaceFlow, conserved, found_flow
 from core.ventilation.jet import TERMINAL_M_S, supply_jet
-from core.ventilation.openings import exchange, opening_patches
+from core.ventilation.openings import Weights, exchange, opening_patches, outlet_weights
 from core.ventilation.tracer import Tracer, eddy_diffusivity_m2_s, tracer
 
 SAMPLES = 32
@@ -107,8 +107,8 @@ NAMES: Mapping[str, tuple[str, str]] = {
 }
 _TOGETHER = " Errors of T that all places share are drawn for the whole room at once."
 _BY_AREA = (
-    "What leaves by each outlet is not stated: outlets share it by area. The exhaust's temperature and the heat "
-    "depend on that, and their intervals leave it out: state each outlet's flow."
+    "What leaves by each outlet is not stated: outlets share it by area. The intervals of the exhaust's temperature "
+    "and of the heat allow for any other sharing: state each outlet's flow to narrow them."
 )
 _BY_AGE = ("mean_age", "efficiency", "zone_index", "source_effectiveness")
 NO_VELOCITY = (
@@ -177,9 +177,9 @@ def _sampled(solution: Solution, scene: Scene, asked: IndoorAsked, found: Figure
     """The figures of each sample; ages differ from the found one's as they do on their own, larger cells."""
     length_m = LENGTH_SHARE * float(np.prod(scene.room.size_m)) ** (1 / 3)
     coarse = _figures(solution, scene, asked, SAMPLE_CELLS, _ignored)
-    drawn = []
+    drawn, rng = [], np.random.default_rng(0)
     for sample in samples(solution, asked.samples, length_m):
-        figures = _figures(sample, scene, asked, SAMPLE_CELLS, _ignored)
+        figures = _figures(sample, scene, asked, SAMPLE_CELLS, _ignored, outlet_weights(scene, rng))
         for key in _BY_AGE:
             if key in figures and key in found and key in coarse:
                 figures[key] *= found[key] / coarse[key]
@@ -188,12 +188,17 @@ def _sampled(solution: Solution, scene: Scene, asked: IndoorAsked, found: Figure
 
 
 def _figures(
-    solution: Solution, scene: Scene, asked: IndoorAsked, cells: int, lacks: Callable[[str], object]
+    solution: Solution,
+    scene: Scene,
+    asked: IndoorAsked,
+    cells: int,
+    lacks: Callable[[str], object],
+    outlets: Weights | None = None,
 ) -> Figures:
     figures = _in_the_zone(solution, scene, asked)
     if solution.velocity_m_s is not None:
         try:
-            figures |= _of_the_flow(solution, scene, asked, cells)
+            figures |= _of_the_flow(solution, scene, asked, cells, outlets)
             figures |= _of_the_jets(solution, scene)
         except SettingError as error:
             lacks(str(error))
@@ -246,10 +251,12 @@ def _heights(solution: Solution, there: np.ndarray) -> Figures:
     }
 
 
-def _of_the_flow(solution: Solution, scene: Scene, asked: IndoorAsked, cells: int) -> Figures:
+def _of_the_flow(
+    solution: Solution, scene: Scene, asked: IndoorAsked, cells: int, outlets: Weights | None
+) -> Figures:
     solution = solution.filled()
     found = found_flow(solution, opening_patches(scene))
-    air = exchange(found, solution.temperature_k, scene)
+    air = exchange(found, solution.temperature_k, scene, outlets)
     transport = _tracer(found, cells)
     change = air_change(transport)
     share = zone_share(change.flow, *asked.zone.box(scene.room))

@@ -3,17 +3,21 @@
     heat = rho cp Q (T_supply - T_exhaust)
 
 Density is that of the air at rest, as the Boussinesq equations have it, also where the supply is ten kelvin warmer.
+Outlets of unstated flow share what leaves by area. Nobody said so: `outlet_weights` draws other shares.
 """
 
 from collections.abc import Iterator, Sequence
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import Float
 
 from core.air import Air
 from core.geometry import WALLS, Face, face_of
 from core.scene import Inlet, Outlet, Patch, Scene
 from core.ventilation.face_flow import FaceFlow, Vertices, around, corner_mean
+
+Weights = Float[np.ndarray, " outlets"]
 
 # A face of an opening's edge lets less than this share of the greatest flow through.
 _UNSMEARED = 0.8
@@ -42,17 +46,35 @@ def opening_patches(scene: Scene) -> tuple[Patch, ...]:
     return tuple(part.patch for part in scene.boundary if isinstance(part, Inlet | Outlet))
 
 
-def exchange(flow: FaceFlow, temperature_k: Vertices, scene: Scene) -> AirExchange:
+def exchange(
+    flow: FaceFlow, temperature_k: Vertices, scene: Scene, weights: Weights | None = None
+) -> AirExchange:
     """What the walls let through. `temperature_k` is on the vertices that `flow` lies between.
 
     Where the scene states no opening, a wall with flow is one for the air that enters, and one for what leaves.
+    What passes the stated outlets is multiplied by `weights`, one each, where given.
     """
     passages = tuple(
-        _stated(flow, temperature_k, scene) if opening_patches(scene) else _seen(flow, temperature_k)
+        _stated(flow, temperature_k, scene, weights) if opening_patches(scene) else _seen(flow, temperature_k)
     )
     supply_k, exhaust_k = (_mean_k(passages, sign) for sign in (1.0, -1.0))
     heat_w = heat_capacity_j_m3_k(scene.air) * flow.entering_m3_s * (supply_k - exhaust_k)
     return AirExchange(passages, flow.entering_m3_s, supply_k, exhaust_k, heat_w)
+
+
+def outlet_weights(scene: Scene, rng: np.random.Generator) -> Weights:
+    """What leaves by each stated outlet over what is taken for it: 1 where its flow is stated, else drawn.
+
+    The drawn shares sum to one and are by area in the mean; where areas are equal, each sharing is as likely as any
+    other (a Dirichlet distribution whose numbers sum to the number of outlets).
+    """
+    outlets = [part for part in scene.boundary if isinstance(part, Outlet)]
+    weights, unstated = np.ones(len(outlets)), [n for n, one in enumerate(outlets) if one.flow_m3_s is None]
+    if len(unstated) > 1:
+        areas_m2 = np.array([outlets[n].patch.area_m2 for n in unstated])
+        shares = areas_m2 / areas_m2.sum()
+        weights[unstated] = rng.dirichlet(len(unstated) * shares) / shares
+    return weights
 
 
 def heat_capacity_j_m3_k(air: Air) -> float:
@@ -60,13 +82,17 @@ def heat_capacity_j_m3_k(air: Air) -> float:
     return air.heat_capacity_j_m3_k
 
 
-def _stated(flow: FaceFlow, temperature_k: Vertices, scene: Scene) -> Iterator[Passage]:
+def _stated(
+    flow: FaceFlow, temperature_k: Vertices, scene: Scene, weights: Weights | None
+) -> Iterator[Passage]:
+    of_outlets = iter(() if weights is None else weights)
     for part in scene.boundary:
         if isinstance(part, Inlet | Outlet):
             face = face_of(part.patch.wall)
             inside = around(part.patch, *(flow.axes_m[a] for a in face.along))
             kelvin = [of[inside] for of in _at_faces(temperature_k, face)]
-            yield _passage(f"{part.kind} on {part.patch.wall}", flow.inward(face)[inside], *kelvin)
+            weight = next(of_outlets, 1.0) if isinstance(part, Outlet) else 1.0
+            yield _passage(f"{part.kind} on {part.patch.wall}", weight * flow.inward(face)[inside], *kelvin)
 
 
 def _seen(flow: FaceFlow, temperature_k: Vertices) -> Iterator[Passage]:

@@ -169,6 +169,22 @@ def test_outlets_that_share_what_leaves_by_area_are_told():
     assert "outlets share it by area" not in notes(replace(exhaust, flow_m3_s=0.1), second)
 
 
+def test_how_outlets_share_what_leaves_is_in_the_intervals_of_the_exhaust_and_the_heat():
+    found, (supply, exhaust) = layered(deviation=1e-4), OPENINGS
+    above = Outlet(patch=replace(OUTLET, lower_m=(1.0, 1.5), upper_m=(2.0, 2.0)))
+
+    def width(key: str, *outlets: Outlet) -> float:
+        one = values(found, replace(PLUG_ROOM, boundary=(supply, *outlets)))[key]
+        return one.high - one.low
+
+    stated = (replace(exhaust, flow_m3_s=0.05), above)
+    # Two equal outlets, a metre apart with the faces beside them, so 2 K; each sharing is as likely: 95 % of it.
+    assert width("exhaust_temperature", exhaust, above) == pytest.approx(0.95 * 2.0, rel=0.15)
+    assert width("exhaust_temperature", *stated) < 0.01
+    assert width("heat", exhaust, above) > 100.0 * width("heat", *stated)
+    assert width("flow", exhaust, above) == pytest.approx(width("flow", *stated))
+
+
 def test_still_air_says_why_it_has_no_age():
     still = replace(layered(), velocity_m_s=np.zeros((21, 7, 7, 3)))
     found = indoor(still, replace(PLUG_ROOM, boundary=OPENINGS))

@@ -1,12 +1,14 @@
 """Air and heat through the openings, by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from core.geometry import Box, looking_along_y
 from core.scene import FixedTexture, Inlet, Outlet, Scene, View
 from core.ventilation.face_flow import face_flow
-from core.ventilation.openings import exchange, opening_patches
+from core.ventilation.openings import AirExchange, exchange, opening_patches, outlet_weights
 from tests.core.ventilation.rooms import INLET, OUTLET, box, plug, ventilated
 
 VIEW = View(camera=looking_along_y(position_m=(2.0, -5.0, 1.0), width_px=64, height_px=48, focal_px=100.0))
@@ -64,3 +66,42 @@ def test_leaving_air_is_not_as_cold_as_the_wall_around_its_outlet():
     )
     air = exchange(face_flow(box(found.velocity_m_s, cold), opening_patches(stated)), cold, stated)
     assert (air.supply_k, air.exhaust_k) == pytest.approx((290.0, 295.0))
+
+
+def test_outlets_of_unstated_flow_share_it_by_area_in_the_mean_and_in_any_way():
+    wide = Outlet(patch=replace(OUTLET, lower_m=(1.0, 0.0), upper_m=(2.5, 0.5)))
+    narrow = Outlet(patch=replace(OUTLET, lower_m=(1.0, 1.0), upper_m=(1.5, 1.5)))
+    rng = np.random.default_rng(0)
+
+    def drawn(*outlets: Outlet) -> np.ndarray:
+        return np.array([outlet_weights(scene(*outlets), rng) for _ in range(4000)])
+
+    shares = drawn(wide, narrow) * np.array([0.75, 0.25])
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0)
+    # Of a Dirichlet distribution of 1.5 and 0.5: mean 0.75, variance 0.75 x 0.25 / 3.
+    assert shares[:, 0].mean() == pytest.approx(0.75, abs=0.02)
+    assert shares[:, 0].std() == pytest.approx(0.25, rel=0.05)
+    # What one of them leaves is the other's.
+    np.testing.assert_array_equal(drawn(replace(wide, flow_m3_s=0.1), narrow), 1.0)
+    np.testing.assert_array_equal(drawn(wide), 1.0)
+
+
+def test_weights_of_outlets_move_the_exhaust_and_the_heat():
+    found = plug(8)
+    higher_k = 290.0 + 2.0 * np.broadcast_to(found.z_m, found.temperature_k.shape)
+    supply = Inlet(
+        patch=replace(INLET, upper_m=(2.0, 1.9)), temperature_k=290.0, velocity_m_s=(0.1, 0.0, 0.0)
+    )
+    low, high = (Outlet(patch=replace(OUTLET, lower_m=(0.5, z), upper_m=(2.5, z + 0.4))) for z in (0.0, 1.6))
+
+    def leaving(weights: np.ndarray | None, *outlets: Outlet) -> AirExchange:
+        stated = scene(supply, *outlets)
+        return exchange(face_flow(found, opening_patches(stated)), higher_k, stated, weights)
+
+    both, below, above = leaving(None, low, high), leaving(None, low), leaving(None, high)
+    assert both.exhaust_k == pytest.approx(0.5 * (below.exhaust_k + above.exhaust_k))
+    assert above.exhaust_k > below.exhaust_k + 2.0
+    moved = leaving(np.array([1.5, 0.5]), low, high)
+    assert moved.exhaust_k == pytest.approx(0.75 * below.exhaust_k + 0.25 * above.exhaust_k)
+    share = (moved.supply_k - moved.exhaust_k) / (both.supply_k - both.exhaust_k)
+    assert moved.heat_w == pytest.approx(share * both.heat_w)
