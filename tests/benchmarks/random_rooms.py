@@ -191,7 +191,7 @@ def row_of(
         "carried_T_air_rms_k": rms(off_walls(volume.temperature_k[:1] - volume.temperature_k)),
         "distrusts": "distrust the velocity" in said,
         "checks": "Check it" in said,
-        **indoor_row(replace(solution, history=()), volume, exact),
+        **indoor_row(replace(solution, history=()), path, exact),
     }
 
 

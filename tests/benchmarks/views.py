@@ -112,7 +112,7 @@ def row(asked: argparse.Namespace, truth: Path, seed: int, walls: tuple[WallName
         "solver_s": round(scores["solver_s"], 1),
         "wall_s": round(done.wall_s, 1),
         "outcome": scores["outcome"],
-        **row_of(done.solution, volume, scene),
+        **row_of(done.solution, truth, scene),
         "notes": [*done.measurement.notes, *done.solution.notes],
     }
 
