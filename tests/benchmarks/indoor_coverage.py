@@ -98,8 +98,10 @@ def row_of(found: Solution, path: Path, scene: Scene) -> dict:
     held = {}
     for one in derived_maps(found, scene):
         if one.low is not None and one.high is not None:
-            value, slack = true_maps[one.name], _DIGITS * float(np.ptp(one.values))
-            held[one.name] = float(np.mean(inner((value >= one.low - slack) & (value <= one.high + slack))))
+            value, air = true_maps[one.name], np.isfinite(one.values)
+            slack = _DIGITS * float(np.ptp(one.values[air]))
+            there = (value >= one.low - slack) & (value <= one.high + slack)
+            held[one.name] = float(np.mean(inner(there)[inner(air)]))
     real = {one.key: one.value for one in indoor(true, scene).quantities} | _as_stated(true, truth)
     with np.load(path) as kept:
         if "nut" in kept and "averaging_s" not in kept:
