@@ -7,7 +7,7 @@ projector order stand apart (rays.jsonl): what they change is a shift, and every
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,6 +20,7 @@ from app.plan.tradeoff import front, off_front, span, table
 from app.reconstruct.problem import with_scene
 from app.volume.file import RoomVolume, read_volume
 from app.volume.measurement import synthetic_problem
+from app.volume.misread import misread
 from app.volume.scene import RigOptions
 from app.volume.score import score_solution
 from core.estimate.forward_runs import RoomSettings
@@ -78,6 +79,10 @@ def tradeoff(
     volumes: Annotated[list[Path], typer.Argument(help="Reference rooms (NPZ).")],
     out: Annotated[Path, typer.Option(help="Folder for rows.jsonl, front.png and table.md.")] = Path("bench"),
     limit_s: Annotated[float, typer.Option(help="Start no further solve after this [s].")] = 3600.0,
+    presets: Annotated[bool, typer.Option("--presets", help="Presets alone, without other sizes.")] = False,
+    misread_by: Annotated[
+        int | None, typer.Option("--misread", help="Entries are wrong as their deviations say: a seed.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON line a row.")] = False,
 ) -> None:
     """Sweep presets, sizes, frames and light over rooms; find what is best at each price."""
@@ -85,7 +90,8 @@ def tradeoff(
     rows: list[dict[str, Any]] = []
     out.mkdir(parents=True, exist_ok=True)
     with (out / "rows.jsonl").open("w", encoding="utf-8") as file:
-        for row in sweep(volumes, lambda: time.monotonic() - began > limit_s):
+        points = [point for point in POINTS if point.preset or not presets]
+        for row in sweep(volumes, lambda: time.monotonic() - began > limit_s, points, misread_by):
             rows.append(row)
             file.write(json.dumps(row) + "\n")
             file.flush()
@@ -111,25 +117,30 @@ def judgement(rows: list[dict[str, Any]]) -> Iterator[str]:
                 yield f"{preset}: {name} error {off:.2f} times the best found in its time (median)."
 
 
-def sweep(volumes: list[Path], is_over: Callable[[], bool]) -> Iterator[dict[str, Any]]:
+def sweep(
+    volumes: list[Path], is_over: Callable[[], bool], points: Sequence[TradePoint], misread_by: int | None
+) -> Iterator[dict[str, Any]]:
     """Every point on every room at every level; the cheap ones first."""
     truths = {path.stem: read_volume(path) for path in volumes}
-    for point in POINTS:
+    for point in points:
         for name, truth in truths.items():
             for information in point.information:
                 if is_over():
                     return
-                row = solved(point, name, truth, information)
+                row = solved(point, name, truth, information, misread_by)
                 if row is not None:
                     yield row
 
 
-def solved(point: TradePoint, name: str, truth: RoomVolume, information: str) -> dict[str, Any] | None:
-    """One row; None where this method refuses what is known."""
+def solved(
+    point: TradePoint, name: str, truth: RoomVolume, information: str, misread_by: int | None
+) -> dict[str, Any] | None:
+    """One row; None where this method refuses what is known. Entries are exact without a seed `misread_by`."""
     options = RigOptions(light=point.light, frames=point.frames)  # type: ignore[arg-type]
     made = synthetic_problem(truth, options, information, window_px=32, seed=1)  # type: ignore[arg-type]
     cells = point.cells or made.scene.solve.grid
-    scene = replace(made.scene, solve=replace(made.scene.solve, grid=cells))
+    stated = made.scene if misread_by is None else misread(made.scene, misread_by)
+    scene = replace(stated, solve=replace(stated.solve, grid=cells))
     problem = with_scene(made, scene)
     try:
         found = _solve(point, problem)
@@ -144,7 +155,7 @@ def solved(point: TradePoint, name: str, truth: RoomVolume, information: str) ->
         "method": point.method, "preset": point.preset, "cells": point.cells, "frames": point.frames,
         "solver_s": round(found.solver_s, 2),
         "T_K": round(scores["T"]["rms_K"], 4), "T_share": round(scores["T"]["rms_K"] / scale_k, 3),
-        "T_departure": _rounded(scores["T"]["departure_of_departures"]),
+        "T_departure": _rounded(scores["T"]["departure_of_departures"]), "misread": misread_by,
         "u": _rounded(scores["u"] and scores["u"]["rel"]), "p": _rounded(scores["p"] and scores["p"]["rel"]),
         "outcome": found.outcome.name,
     }  # fmt: skip
