@@ -1,7 +1,8 @@
-"""Known temperatures on the vertices of a grid: planes as values, outlets and sensors as means.
+"""Known temperatures of the air on the vertices of a grid: planes as values, outlets and sensors as means.
 
 The temperature of a wall is not used: its thermal layer is thinner than a cell, so the air beside it is at another
-temperature. Solvers that model the layer use it.
+temperature. Solvers that model the layer use it. So a plane, which lies on a wall, tells the air's temperature where
+air leaves through it, and where its wall is stated to pass no heat.
 """
 
 from dataclasses import dataclass
@@ -12,10 +13,13 @@ from scipy.interpolate import RegularGridInterpolator
 
 from core.data_error import PLANE_ON_VERTICES_K
 from core.geometry import Box, WallName, face_of
+from core.known import stated_walls
 from core.problem import PlaneData, Problem
-from core.scene import Inlet, Outlet, Patch
+from core.scene import Heater, Inlet, Outlet, Patch, Scene
 
 Volume = Float[np.ndarray, "nx ny nz"]
+# Of what is anywhere between two ends: its standard deviation over their distance.
+EVEN_STD = 12**-0.5
 
 
 @dataclass(frozen=True)
@@ -82,17 +86,25 @@ def known_temperature(problem: Problem, grid: VertexGrid) -> KnownTemperature:
     """Gather planes, outlets and sensors.
 
     Supply air and heaters are not the temperature of the room's air: as values at their place they would lift the
-    level of the whole room. The supply's temperature is used only if nothing else is known.
+    level of the whole room. Where nothing else is known the air's mean lies between them, walls and the air at rest.
     """
     mask = np.zeros(grid.shape, bool)
     value, std = np.full(grid.shape, np.nan), np.full(grid.shape, np.nan)
+    means, entering_k = [], []
     for plane in problem.planes:
         wall: WallName = plane.wall  # type: ignore[assignment]
-        # The plane's rim lies in the thermal layers of the four neighbouring walls.
-        on_wall(wall, mask)[1:-1, 1:-1] = True
-        on_wall(wall, value)[...] = plane_on_grid(grid, plane, plane.temperature_k)
-        on_wall(wall, std)[...] = PLANE_ON_VERTICES_K
-    means = []
+        kelvin = plane_on_grid(grid, plane, plane.temperature_k)
+        entering, leaving = _passing(grid, plane)
+        entering_k += list(kelvin[entering])
+        if _passes_no_heat(problem.scene, wall):
+            air = ~(entering | _heated(problem.scene, grid, wall))
+            # The plane's rim lies in the thermal layers of the four neighbouring walls.
+            on_wall(wall, mask)[1:-1, 1:-1] = air[1:-1, 1:-1]
+            on_wall(wall, value)[...] = kelvin
+            on_wall(wall, std)[...] = PLANE_ON_VERTICES_K
+        elif leaving.any():
+            members = on_wall(wall, _numbers(grid))[leaving]
+            means.append((members, float(kelvin[leaving].mean()), PLANE_ON_VERTICES_K))
     for known in problem.scene.boundary:
         if isinstance(known, Outlet) and known.mean_temperature_k is not None:
             members = _patch_vertices(grid, known.patch)
@@ -103,19 +115,72 @@ def known_temperature(problem: Problem, grid: VertexGrid) -> KnownTemperature:
         ):
             if np.isfinite(kelvin):
                 means.append((np.array([_nearest(grid, position)]), float(kelvin), float(kelvin_std)))
-    if not mask.any() and not means:
-        # The last resort: supply air is the one temperature that is known.
-        means = [
-            (_patch_vertices(grid, known.patch), known.temperature_k, known.temperature_std_k)
-            for known in problem.scene.boundary
-            if isinstance(known, Inlet)
-        ]
+    if not mask.any() and not means and (ends_k := _ends_k(problem, entering_k)):
+        low_k, high_k = min(ends_k), max(ends_k)
+        std_k = max(EVEN_STD * (high_k - low_k), PLANE_ON_VERTICES_K)
+        means = [(np.arange(mask.size), 0.5 * (low_k + high_k), std_k)]
     return KnownTemperature(mask, value, std, tuple(means))
 
 
+def _ends_k(problem: Problem, planes_in_k: list[float]) -> list[float]:
+    """What the air's mean lies between where supplies alone are known; empty without them."""
+    supplies_k = [part.temperature_k for part in problem.scene.boundary if isinstance(part, Inlet)]
+    known_k = [*supplies_k, *planes_in_k]
+    return [*known_k, *planes_ends_k(problem), problem.scene.air.ambient_temperature_k] if known_k else []
+
+
+def planes_ends_k(problem: Problem) -> list[float]:
+    """The lowest and the highest temperature of each plane."""
+    return [float(end(plane.temperature_k)) for plane in problem.planes for end in (np.min, np.max)]
+
+
+def known_air_k(problem: Problem) -> list[float]:
+    """Temperatures of air that are known somewhere: supplies, heaters, outlets, sensors."""
+    kelvin = [float(t) for s in problem.sensors for t in s.temperature_k[np.isfinite(s.temperature_k)]]
+    for item in problem.scene.boundary:
+        match item:
+            case Inlet() | Heater():
+                kelvin.append(item.temperature_k)
+            case Outlet(mean_temperature_k=float() as mean):
+                kelvin.append(mean)
+            case _:
+                pass
+    return kelvin
+
+
+def _passes_no_heat(scene: Scene, wall: WallName) -> bool:
+    stated = stated_walls(scene)[wall]
+    return stated is not None and stated.thermal == "adiabatic"
+
+
+def _heated(scene: Scene, grid: VertexGrid, wall: WallName) -> Bool[np.ndarray, "first second"]:
+    """Vertices on heaters of a wall."""
+    masks = [
+        patch_mask(grid, part.patch)
+        for part in scene.boundary
+        if isinstance(part, Heater) and part.patch.wall == wall
+    ]
+    return np.logical_or.reduce([np.zeros_like(on_wall(wall, _numbers(grid)), bool), *masks])
+
+
+def _passing(
+    grid: VertexGrid, plane: PlaneData
+) -> tuple[Bool[np.ndarray, "first second"], Bool[np.ndarray, "first second"]]:
+    """Vertices beside which air enters by a plane, and those around which it leaves everywhere."""
+    face = face_of(plane.wall)  # type: ignore[arg-type]
+    inward = face.inward * np.asarray(plane.velocity_m_s)[..., face.axis]
+    entering, leaving = (
+        plane_on_grid(grid, plane, np.where(sign * inward > 0, 1.0, 0.0)) for sign in (1, -1)
+    )
+    return entering > 0, leaving == 1
+
+
+def _numbers(grid: VertexGrid) -> Int[np.ndarray, "nx ny nz"]:
+    return np.arange(int(np.prod(grid.shape))).reshape(grid.shape)
+
+
 def _patch_vertices(grid: VertexGrid, patch: Patch) -> Int[np.ndarray, " members"]:
-    everything = np.arange(int(np.prod(grid.shape))).reshape(grid.shape)
-    return on_wall(patch.wall, everything)[patch_mask(grid, patch)]
+    return on_wall(patch.wall, _numbers(grid))[patch_mask(grid, patch)]
 
 
 def _nearest(grid: VertexGrid, position_m: Float[np.ndarray, "3"]) -> int:

@@ -18,6 +18,7 @@ from core.known import leaving_excess_k
 from core.metrics import inner, rms
 from core.problem import Problem
 from core.result import Solution
+from core.setting import SettingError
 from core.solve.draft.draft import solve_draft
 
 # The default rig at each level of information; the projector far away as in the paper and as near as a room
@@ -54,13 +55,19 @@ def draft(
     for name, options, information in CASES:
         problem = synthetic_problem(truth, options, information, window_px=32, seed=0)
         began = time.process_time()
-        found = solve_draft(problem)
+        try:
+            found = solve_draft(problem)
+        except SettingError as error:
+            typer.echo(f"{name}, {information}: {error}", err=True)
+            continue
         cpu_s = time.process_time() - began
         scores = score_solution(found, truth)["T"]
         line = {
             "rig": name,
             "information": information,
+            "room": volume.stem,
             "T_K": round(scores["rms_K"], 4),
+            "T_air_K": round(scores["air"]["rms_K"], 4),
             "T_departure": round(scores["departure_of_departures"], 4),
             "inlet_plane_K": round(scores["trivial"]["inlet_plane"], 4),
             "y_mean_K": round(scores["trivial"]["y_mean"], 4),

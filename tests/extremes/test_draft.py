@@ -104,13 +104,17 @@ def known(name: str, expected, *parts, planes=()) -> Row:
 
 
 INLET = Inlet(patch=PATCH, temperature_k=303.15, velocity_m_s=(0.5, 0.0, 0.0))
+TIGHT = Wall(wall="x_min", thermal="adiabatic")
 HALF = np.array([[1e8, 0.0], [0.0, 1e-6]])
 
 ROWS = [
     *[level(k) for k in (0.0, 1e-3, -10.0, 10.0, 100.0)],
-    solved("still air beside a plane at T0", Near(0.0, abs=2e-3), shifts(), planes=[plane(T0)]),
+    solved("still air beside a plane at T0", Near(0.0, abs=2e-3), shifts(), planes=[plane(T0)],
+           world=scene(TIGHT)),
+    solved("a plane on a wall and nothing else", Refused("level of the temperature"), shifts(), planes=[plane(T0)]),
     solved("T in = T0", Near(0.0, abs=2e-3), shifts(), world=scene(replace(INLET, temperature_k=T0))),
-    solved("a plane at 2000 K", Within(-50.0, 5000.0), shifts(), planes=[plane(T0 + 1700.0)]),
+    solved("a plane at 2000 K", Within(-50.0, 5000.0), shifts(), planes=[plane(T0 + 1700.0)],
+           world=scene(TIGHT)),
     solved("shifts of 1e-6 px", Within(-1.0, 1.0), shifts(1e-6), sensors=[sensor(T0)]),
     solved("shifts of 10 px", Within(-293.15, 5000.0), shifts(10.0), sensors=[sensor(T0)]),
     solved("shifts that know nothing", Refused("no shift better than 1 px"), shifts(0.3, 1e-6), sensors=[sensor(T0)]),
@@ -145,11 +149,12 @@ ROWS = [
     checked("a wall described twice", "describe it once", known=(Wall(wall="x_max"), Wall(wall="x_max"))),
     checked("supply that leaves", "does not enter the room", known=(replace(INLET, velocity_m_s=(-0.5, 0.0, 0.0)),)),
     checked("an inlet on an outlet", "overlap", known=(INLET, Outlet(patch=PATCH))),
-    known("a plane", Near(300.0), planes=[plane(300.0)]),
+    known("a plane on a wall", Near(300.0), TIGHT, planes=[plane(300.0)]),
     checked("an inlet against its plane", "Correct the one that is wrong", known=(INLET,), planes=[plane(T0)]),
     checked("a heater against its plane", "Correct the one that is wrong", planes=[plane(T0)],
             known=(Heater(patch=PATCH, temperature_k=320.0),)),
-    known("an inlet alone", Near(303.15), INLET),
+    # Between the supply and the air at rest.
+    known("an inlet alone", Near(0.5 * (303.15 + T0)), INLET),
     known("an outlet smaller than a cell", Near(299.0),
           Outlet(patch=Patch(wall="x_max", lower_m=(1.0, 1.0), upper_m=(1.001, 1.001)), mean_temperature_k=299.0)),
 ]  # fmt: skip

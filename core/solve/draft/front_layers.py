@@ -12,9 +12,9 @@ from jaxtyping import Float
 
 from core.geometry import WALLS, WallName
 from core.known import stated_walls
-from core.known_temperature import VertexGrid, on_wall
+from core.known_temperature import EVEN_STD, VertexGrid, on_wall
 from core.problem import Problem
-from core.solve.draft.temperature_prior import RISE_STD, profile_range_k
+from core.solve.draft.temperature_prior import profile_range_k
 from core.solve.draft.temperature_system import ShiftOperator
 
 
@@ -22,7 +22,7 @@ def front_layers_px(
     problem: Problem, operators: Sequence[ShiftOperator], grid: VertexGrid, per_k: float
 ) -> list[Float[np.ndarray, "windows 2 errors"]]:
     """Errors of one standard deviation of each view's shifts; none before an adiabatic wall."""
-    walls, jump_k = stated_walls(problem.scene), RISE_STD * profile_range_k(problem)
+    walls, jump_k = stated_walls(problem.scene), EVEN_STD * profile_range_k(problem)
     found = []
     for view, operator, shift in zip(problem.scene.views, operators, problem.shifts, strict=True):
         front, errors = _opposite(view.wall), []

@@ -9,9 +9,8 @@ Unknown is the excess refractivity n on a vertex grid, in which the data are lin
 
 One view sees integrals along its rays: across them the data decide, along them the prior (smooth: of the part na
 that a view along a tells, la is long) and the known planes do. Views along several axes each have a part, with a
-size of its own (`temperature_prior`). Where no plane gives the profile over height, the parts are the departure from
-a profile of its own, which costs only (Dz profile)^2 / step^2: pictures do not see the level, so nothing but
-thermometers may hold it.
+size of its own (`temperature_prior`). The parts are the departure from a profile over the height, which costs only
+(Dz profile)^2 / step^2: pictures do not see the level, so nothing but what is known of the air may hold it.
 
 Cost: conjugate gradients, two operator products an iteration; a few solves more for the deviations. Error:
 what varies along the rays and is not on a known plane stays unseen.
@@ -42,7 +41,6 @@ from core.solve.draft.temperature_prior import (
     TemperatureSettings,
     data_weight,
     excess,
-    level_k,
     prior_parts,
     prior_temperature,
     profile_range_k,
@@ -163,12 +161,12 @@ def _system(
     if not known.mask.any() and not known.means:
         raise SettingError(
             "Nothing fixes the level of the temperature: deflections see only gradients. "
-            "Add an inlet, a plane field, an outlet's mean temperature, or a point sensor to the scene."
+            "Add an inlet, an outlet's mean temperature, a point sensor, or a plane field that air passes or whose "
+            "wall passes no heat."
         )
     # Kelvin to excess refractivity at ambient: only scales weights, never values.
     per_k = air.ambient_refractivity / air.ambient_temperature_k
-    prior_k = prior_temperature(problem, grid)
-    prior = excess(air, prior_k + level_k(known, prior_k) - air.ambient_temperature_k)
+    prior = excess(air, prior_temperature(problem, known, grid) - air.ambient_temperature_k)
     representation = _paths(problem) * settings.representation
     weights = tuple(
         data_weight(nearly_still(shift), representation) * as_air[:, None, None]
@@ -189,7 +187,7 @@ def _system(
         per_k,
         prior_parts(operators, along, weights, shifts, prior, grid, settings),
         steepest_slopes(problem.scene),
-        None if problem.planes else profile_weight(per_k * profile_range_k(problem), grid),
+        profile_weight(per_k * profile_range_k(problem), grid),
     )
     return system, prior, shifts
 

@@ -1,7 +1,7 @@
 """The prior of `draft`, and the weights of its windows.
 
-The prior mean is the known plane's profile over height, the same in the whole room. Without a plane the thermometers
-give the level, and the profile is free within the range of the air that is known.
+What is known of the air (`core.known_temperature`) gives the level, and the profile over height is free within the
+range of the air that is known.
 
 Departures from that are the sum of independent parts, one for each axis that views look along: a part varies slowly
 along its axis. The sizes of the parts are those at which smooth random fields move each view's pattern as far as it
@@ -18,19 +18,17 @@ from scipy.optimize import nnls
 
 from core.air import Air
 from core.data_error import CORRELATED_DATA, REPRESENTATION
-from core.geometry import face_of
-from core.known_temperature import KnownTemperature, VertexGrid, known_temperature, plane_on_grid
+from core.known_temperature import EVEN_STD, KnownTemperature, VertexGrid, known_air_k, planes_ends_k
 from core.motion import without_motion
 from core.problem import Problem, ShiftMeasurement
-from core.scene import Heater, Inlet, Outlet
 from core.setting import setting
 from core.solve.draft.temperature_system import AirPart, ShiftOperator, Volume
 
 # A thousandth of a kelvin, as excess refractivity.
 _LEAST_SIZE = 1e-9
 _LEAST_RANGE_K = 0.1
-# A profile rises by something between nothing and the range of the air that is known: the mean and deviation of that.
-_RISE, RISE_STD = 0.5, 12**-0.5
+# A profile rises by something between nothing and the range of the air that is known: the mean of that.
+_RISE = 0.5
 _DRAWS = 4
 # A shared error may have any size if its deviation is so many times the stated one.
 _ANY = 1e4
@@ -58,57 +56,28 @@ class TemperatureSettings:
 
 def profile_weight(reach: float, grid: VertexGrid) -> float:
     """One over the variance of the profile's step from one height to the next, as of a random walk."""
-    return (grid.shape[2] - 1) / (RISE_STD * reach) ** 2
+    return (grid.shape[2] - 1) / (EVEN_STD * reach) ** 2
 
 
-def level_k(known: KnownTemperature, prior_k: Volume) -> float:
-    """Mean of the thermometers' and outlets' readings above the prior; 0 where a plane gives the level.
+def prior_temperature(problem: Problem, known: KnownTemperature, grid: VertexGrid) -> Volume:
+    """The level of what is known, rising over the height by half of the range of the air that is known.
 
-    Images do not see the level, so a prior of the size that they give must not pull it to ambient.
+    Warm air lies on cold. Images do not see the level, so a prior of the size that they give must not pull it.
     """
-    if known.mask.any() or not known.means:
-        return 0.0
-    weights = np.array([std**-2 for _, _, std in known.means])
-    above = [kelvin - float(prior_k.reshape(-1)[members].mean()) for members, kelvin, _ in known.means]
-    return float(np.average(above, weights=weights))
-
-
-def prior_temperature(problem: Problem, grid: VertexGrid) -> Volume:
-    """The first known plane's profile over height, the same everywhere.
-
-    Without a plane: the mean of outlets and sensors (ambient if there are none), rising over the height by half of
-    the range of the air that is known, since warm air lies on cold. Of a plane only the profile is used, since a jet
-    in it is somewhere else a metre further on.
-    """
-    # The outflow has about the room's mean temperature; without it a warm room would be pulled to ambient.
-    measured = [kelvin for _, kelvin, _ in known_temperature(problem, grid).means]
-    level = float(np.mean(measured)) if measured else problem.scene.air.ambient_temperature_k
-    rise_k = _RISE * profile_range_k(problem) if len(known_air_k(problem)) > 1 else 0.0
-    volume = np.broadcast_to(level + rise_k * np.linspace(-0.5, 0.5, grid.shape[2]), grid.shape).copy()
-    for plane in problem.planes[:1]:
-        axis = face_of(plane.wall).axis
-        on_grid = np.expand_dims(plane_on_grid(grid, plane, plane.temperature_k), axis)
-        volume[...] = np.median(on_grid, axis=(0, 1), keepdims=True)
-    return volume
-
-
-def known_air_k(problem: Problem) -> list[float]:
-    """Temperatures of air that are known somewhere: supplies, heaters, outlets, sensors."""
-    kelvin = [float(t) for s in problem.sensors for t in s.temperature_k[np.isfinite(s.temperature_k)]]
-    for item in problem.scene.boundary:
-        match item:
-            case Inlet() | Heater():
-                kelvin.append(item.temperature_k)
-            case Outlet(mean_temperature_k=float() as mean):
-                kelvin.append(mean)
-            case _:
-                pass
-    return kelvin
+    known_k = known_air_k(problem) + planes_ends_k(problem)
+    rise_k = _RISE * profile_range_k(problem) if len(known_k) > 1 else 0.0
+    rising_k = np.broadcast_to(rise_k * np.linspace(-0.5, 0.5, grid.shape[2]), grid.shape)
+    above_k = [kelvin - rising_k.reshape(-1)[members].mean() for members, kelvin, _ in known.means]
+    weights = [std**-2 for _, _, std in known.means]
+    if known.mask.any():
+        above_k.append(float(np.mean(known.temperature_k[known.mask] - rising_k[known.mask])))
+        weights.append(float(np.mean(known.std_k[known.mask] ** -2)))
+    return rising_k + float(np.average(above_k, weights=weights))
 
 
 def profile_range_k(problem: Problem) -> float:
-    """From the coldest to the hottest air that is known: the most that a profile over height may span."""
-    kelvin = known_air_k(problem)
+    """From the coldest to the hottest that is known, planes too: the most that a profile over height may span."""
+    kelvin = known_air_k(problem) + planes_ends_k(problem)
     if len(kelvin) < 2:
         kelvin.append(problem.scene.air.ambient_temperature_k)
     return max(max(kelvin) - min(kelvin), _LEAST_RANGE_K)

@@ -65,8 +65,8 @@ class System:
     # n is the sum of these, which are independent: one for each axis that a view looks along.
     parts: tuple[AirPart, ...]
     slopes: Slopes
-    # Where no plane gives the profile over height: how much a step of it from one level to the next weighs.
-    profile: float | None
+    # How much a step of the profile over height, from one level to the next, weighs.
+    profile: float
 
     def with_fewer_data(self, times: float) -> "System":
         """The same with windows that count `times` fewer."""
@@ -87,8 +87,7 @@ class System:
             fx, fy, fz = part.stiffness
             variance += 1 / (part.mass + fx * x[:, None, None] + fy * y[None, :, None] + fz * z[None, None])
         precision = 1 / variance
-        if self.profile is not None:
-            precision[0, 0] = self.profile / (len(x) * len(y)) * z
+        precision[0, 0] = self.profile / (len(x) * len(y)) * z
         return precision
 
     def smooth(self, n: Volume) -> Volume:

@@ -12,12 +12,13 @@ from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import RegularGridInterpolator
 
+from core.known_temperature import known_air_k
 from core.losses.boussinesq import FlowValues
 from core.losses.representation import Spans, positions
 from core.problem import Problem
 from core.scene import SolveModel
 from core.solve.draft.draft import solve_draft
-from core.solve.draft.temperature_prior import TemperatureSettings, known_air_k
+from core.solve.draft.temperature_prior import TemperatureSettings
 from core.solve.nondimensional import RoomFrame, height_profile, outlet_height
 
 # Enough to resolve a profile, in a second.
