@@ -65,7 +65,7 @@ def prior_temperature(problem: Problem, known: KnownTemperature, grid: VertexGri
     Warm air lies on cold. Images do not see the level, so a prior of the size that they give must not pull it.
     """
     known_k = known_air_k(problem) + planes_ends_k(problem)
-    rise_k = _RISE * profile_range_k(problem) if len(known_k) > 1 else 0.0
+    rise_k = _RISE * float(np.ptp(known_k)) if known_k else 0.0
     rising_k = np.broadcast_to(rise_k * np.linspace(-0.5, 0.5, grid.shape[2]), grid.shape)
     above_k = [kelvin - rising_k.reshape(-1)[members].mean() for members, kelvin, _ in known.means]
     weights = [std**-2 for _, _, std in known.means]
