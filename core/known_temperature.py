@@ -86,7 +86,8 @@ def known_temperature(problem: Problem, grid: VertexGrid) -> KnownTemperature:
     """Gather planes, outlets and sensors.
 
     Supply air and heaters are not the temperature of the room's air: as values at their place they would lift the
-    level of the whole room. Where nothing else is known the air's mean lies between them, walls and the air at rest.
+    level of the whole room. Where nothing but supplies is known, the mean over the room is taken to lie somewhere
+    between them, what planes show, and the air at rest.
     """
     mask = np.zeros(grid.shape, bool)
     value, std = np.full(grid.shape, np.nan), np.full(grid.shape, np.nan)
@@ -122,10 +123,13 @@ def known_temperature(problem: Problem, grid: VertexGrid) -> KnownTemperature:
     return KnownTemperature(mask, value, std, tuple(means))
 
 
-def _ends_k(problem: Problem, planes_in_k: list[float]) -> list[float]:
-    """What the air's mean lies between where supplies alone are known; empty without them."""
+def _ends_k(problem: Problem, entering_k: list[float]) -> list[float]:
+    """What the air's mean lies between where supplies alone are known; empty without them.
+
+    `entering_k` are the temperatures of planes where air enters by them.
+    """
     supplies_k = [part.temperature_k for part in problem.scene.boundary if isinstance(part, Inlet)]
-    known_k = [*supplies_k, *planes_in_k]
+    known_k = [*supplies_k, *entering_k]
     return [*known_k, *planes_ends_k(problem), problem.scene.air.ambient_temperature_k] if known_k else []
 
 
