@@ -13,7 +13,7 @@ from core.estimate.observation import Observations
 from core.estimate.prior import Prior, looked_through
 from core.known import leaving_excess_k, stated_walls, unknown_walls
 from core.problem import Problem
-from core.room.boundary_conditions import RoomParameters, SuspectedHeater
+from core.room.boundary_conditions import MeasuredWall, RoomParameters, SuspectedHeater
 from core.scene import Driving, Heater, Inlet
 from core.significance import EITHER_WAY, FALSE_ALARMS
 from core.view_frame import told_on_floor
@@ -276,11 +276,12 @@ def undetermined(problem: Problem) -> list[str]:
             "determine the velocity: the one given is that of air driven by the walls alone. Do not use it."
         ]
     walls = stated_walls(problem.scene)
-    if all(wall is None for wall in walls.values()):
+    if all(wall is None or isinstance(wall, MeasuredWall) for wall in walls.values()):
         return [
-            "No wall is stated. Openings were read off the plane of known velocity, and the walls' temperatures "
-            "were fitted; anything else that drives the air is missing. These measurements do not determine the "
-            "velocity: the one given is the room model's guess. State the walls to use it."
+            "No wall is stated. Openings, and the temperature of their wall, were read off the plane of known "
+            "velocity; the other walls' temperatures were fitted, and anything else that drives the air is missing. "
+            "These measurements do not determine the velocity: the one given is the room model's guess. State the "
+            "walls to use it."
         ]
     unknown = unknown_walls(problem.scene)
     if unknown:

@@ -7,17 +7,15 @@ the level (the mean). The second has one part for each axis a that a view looks 
 a view sees only means along its rays: a view of y_max tells b_i(x) b_j(z), one of x_max b_i(y) b_j(z). K is the
 covariance of the coefficients: what is near one another is wrong alike, and parts are independent.
 
-Images do not see the level; thermometers do (a plane, outlets, sensors). A plane on a wall of unknown temperature
-lies in that wall's thermal layer, which the model may have wrong by one constant: that constant is estimated too.
-Walls of stated temperature keep it. The errors that the windows of a picture share, such as what the camera may have
-done, are marginalised. The velocity is not corrected.
+Images do not see the level; thermometers do (a plane of air, outlets, sensors). The errors that the windows of a
+picture share, such as what the camera may have done, are marginalised. The velocity is not corrected.
 
 How large the correction may be follows from the residual itself, by its marginal likelihood: a room that the data
 contradict is corrected further, and is less certain, than one that they confirm. The error of images and planes
 beyond their noise is found with it.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
@@ -47,9 +45,6 @@ _SEEN_SHARE = alike_share(1)
 
 # Numbers of basis functions along x, y and z of a part of the correction: one along an axis is a constant.
 _Part = tuple[int, int, int]
-# Standard deviation of the layer of a plane on a wall of unknown temperature, as a share of the rms departure of T
-# from its mean at each height.
-_LAYER_SHARE = 1.0
 
 
 class Correction(eqx.Module):
@@ -74,7 +69,7 @@ class Correction(eqx.Module):
 
 
 class _Residuals(eqx.Module):
-    """Residuals of one kind, derivatives in the coefficients and the planes' layers, and errors that they share.
+    """Residuals of one kind, derivatives in the coefficients, and errors that they share.
 
     `start` is the kind's error beyond noise from which the search begins; None: thermometers, which read one point
     where the correction is a mean along a view.
@@ -102,7 +97,6 @@ def temperature_correction(
     departure_k: float,
     level_std_k: float,
     wrong_share: float,
-    unknown_walls: Collection[str] = (),
     outlet_std_k: float = 0.0,
 ) -> Correction:
     """Fit the correction to `residual`, the data minus the prediction from `excess_k`.
@@ -113,26 +107,22 @@ def temperature_correction(
     """
     parts = _parts(data.scene)
     bases = [_basis(part, excess_k.shape) for part in parts]
-    kinds = _kinds(data, excess_k, residual, parts, bases, unknown_walls, outlet_std_k)
-    layers = sum(plane.wall in unknown_walls for plane in data.planes)
-    layer_k2 = np.eye(layers) * (_LAYER_SHARE * departure_k) ** 2
+    kinds = _kinds(data, excess_k, residual, parts, bases, outlet_std_k)
 
     def prior_k2(std_k: float) -> np.ndarray:
         profile, *local = (std_k**2 * _prior_share(part) for part in parts)
-        return np.asarray(block_diag(profile + level_std_k**2, *local, layer_k2))
+        return np.asarray(block_diag(profile + level_std_k**2, *local))
 
     std_k, errors = _sizes(
         kinds, prior_k2, _unseen_share(parts), wrong_share * departure_k * float(np.sqrt(_SEEN_SHARE))
     )
     prior, point_k2 = prior_k2(std_k), _unseen_share(parts) * std_k**2
     fitted = _fit(kinds, prior, errors, point_k2)
-    size = sum(len(basis) for basis in bases)
-    covariance = fitted.covariance[:size, :size]
-    before, after = (_variance(bases, c) for c in (prior[:size, :size], covariance))
+    before, after = (_variance(bases, c) for c in (prior, fitted.covariance))
     level = np.concatenate([basis.mean((1, 2, 3)) for basis in bases])
-    level_std_k = float(np.sqrt(level @ covariance @ level))
-    change = _field(bases, fitted.mean[:size])
-    return Correction(change, before, after, point_k2, level_std_k, bases, covariance)
+    level_std_k = float(np.sqrt(level @ fitted.covariance @ level))
+    change = _field(bases, fitted.mean)
+    return Correction(change, before, after, point_k2, level_std_k, bases, fitted.covariance)
 
 
 def _parts(scene: Scene) -> list[_Part]:
@@ -196,12 +186,11 @@ def _kinds(
     residual: Float[np.ndarray, " data"],
     parts: list[_Part],
     bases: list[Float[np.ndarray, "functions _ _ _"]],
-    unknown_walls: Collection[str],
     outlet_std_k: float,
 ) -> list[_Residuals]:
     """What there is of images, planes, sensors and outlets."""
     _, variance, group = data.values()
-    layers, shared = _layer_design(data, unknown_walls), _shared_errors(data)
+    shared = _shared_errors(data)
     own_errors = data.unshared(residual, variance)
     found = []
     for g, designs in (
@@ -212,14 +201,12 @@ def _kinds(
     ):
         own, design = group == g, np.concatenate(designs, axis=1)
         if own.any():
-            extra = layers if g == PLANES else np.zeros((len(design), layers.shape[1]))
-            unknowns = np.concatenate([design, extra], axis=1)
             common = shared if g == IMAGES else np.zeros((len(design), 0))
             # A hundredth of the noise at least: the search begins above zero where a room fits exactly.
             least = 0.01 * float(np.sqrt(np.median(variance[own])))
             start = max(0.5 * spread(own_errors[own]), least) if g in (IMAGES, PLANES) else None
             noise = variance[own] + (outlet_std_k**2 if g == OUTLETS else 0.0)
-            found.append(_Residuals(residual[own], noise, unknowns, common, start))
+            found.append(_Residuals(residual[own], noise, design, common, start))
     return found
 
 
@@ -281,13 +268,6 @@ def _fit(
     mean = covariance @ gained
     unlikely += float(np.linalg.slogdet(known)[1] + np.linalg.slogdet(prior)[1]) - float(gained @ mean)
     return _Fitted(mean, covariance, -0.5 * unlikely)
-
-
-def _layer_design(data: Observations, unknown_walls: Collection[str]) -> Float[np.ndarray, "data layers"]:
-    """Derivative of the planes' blocks in the layer constant of each plane on an unknown wall."""
-    blocks = data.plane_blocks()
-    columns = np.repeat(np.eye(len(blocks)), blocks, axis=0)
-    return columns[:, [plane.wall in unknown_walls for plane in data.planes]]
 
 
 def _shared_errors(data: Observations) -> Float[np.ndarray, "shifts errors"]:

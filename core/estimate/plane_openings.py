@@ -1,4 +1,4 @@
-"""Inlets and outlets that nobody stated, found in a plane of known velocity on a wall.
+"""What a plane on a wall shows that nobody stated: inlets and outlets, and the wall's temperature.
 
 The vertices smear an opening's edges over one spacing. Its patch is the rectangle around the vertices with more
 than half of the fastest flow through it, with the edges where the flow falls to half. The volume flow through the
@@ -12,29 +12,106 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy import ndimage
 
+from core.data_error import PLANE_NOISE_K
 from core.geometry import Vector2, face_of
-from core.known import share_area, stated_walls
+from core.known import measured_outlets, share_area, stated_walls, unknown_walls
 from core.problem import PlaneData, Problem
-from core.scene import Heater, Inlet, Outlet, Patch
+from core.room.boundary_conditions import MeasuredWall
+from core.scene import BoundaryInformation, Driving, Heater, Inlet, Outlet, Patch, Wall
+from core.setting import SettingError
 
 # Flow below this share of the plane's fastest is taken for rounding, not for an opening.
 _SLOWEST = 0.05
+# Enter and leave by a plane may differ by so much of the larger flow: vertices smear openings' edges, and flows are
+# measured with errors. If they differ by more, the room has other openings.
+_UNBALANCED = 0.25
 # Vertices with less than this share of the plane's fastest air lie on wall.
 _STILL = 0.02
 
 
-def with_plane_openings(problem: Problem) -> Problem:
+def with_planes_read(problem: Problem) -> Problem:
+    """The problem with what its planes show and nobody stated: openings, and the temperature of walls."""
+    return _with_walls(_with_openings(problem))
+
+
+def _with_openings(problem: Problem) -> Problem:
     """The problem with the openings of its planes added, if the scene states no inlet, outlet or heater."""
     if any(isinstance(b, Inlet | Outlet | Heater) for b in problem.scene.boundary):
         return problem
     found = tuple(opening for plane in problem.planes for opening in plane_openings(plane))
     if any(share_area(one.patch, other.patch) for one, other in combinations(found, 2)):
         return problem
+    entering, leaving = passing_m3_s(problem)
     kinds = {type(opening) for opening in found}
-    if kinds != {Inlet, Outlet}:
+    if kinds != {Inlet, Outlet} or abs(entering - leaving) > _UNBALANCED * max(entering, leaving):
         return problem
-    scene = replace(problem.scene, boundary=(*problem.scene.boundary, *found))
+    return _stating(problem, (*problem.scene.boundary, *found))
+
+
+def passing_m3_s(problem: Problem) -> tuple[float, float]:
+    """What enters by the planes, and what leaves by them."""
+    entering = leaving = 0.0
+    for plane in problem.planes:
+        face = face_of(plane.wall)
+        inward = face.inward * plane.velocity_m_s[..., face.axis]
+        area_m2 = np.outer(_widths(plane.first_m), _widths(plane.second_m))
+        entering += float((np.maximum(inward, 0.0) * area_m2).sum())
+        leaving += float((np.maximum(-inward, 0.0) * area_m2).sum())
+    return entering, leaving
+
+
+def refuse_walls_alone(problem: Problem) -> None:
+    """Raise SettingError if planes show walls, and nothing states what drives the air or how warm it is.
+
+    The problem is one whose planes were read.
+    """
+    scene = problem.scene
+    stated = [
+        isinstance(part, Driving)
+        or (isinstance(part, Wall) and not isinstance(part, MeasuredWall) and part.thermal == "temperature")
+        for part in scene.boundary
+    ]
+    if any(stated) or not problem.planes or air_planes(problem) or problem.sensors or measured_outlets(scene):
+        return
+    entering, leaving = (round(3600 * flow) for flow in passing_m3_s(problem))
+    raise SettingError(
+        f"{entering} m3/h enter by the planes and {leaving} m3/h leave by them, so they do not show all openings of "
+        "the room; and nothing else states what drives the air or how warm it is. State every inlet and outlet, or "
+        "add a thermometer in the air."
+    )
+
+
+def _with_walls(problem: Problem) -> Problem:
+    """The problem with the temperature of each wall on which a plane lies, if nobody stated what heat passes it."""
+    walls, unknown = stated_walls(problem.scene), unknown_walls(problem.scene)
+    shown = [_wall(plane, walls[plane.wall]) for plane in problem.planes if plane.wall in unknown]
+    if not shown:
+        return problem
+    replaced = [walls[wall.wall] for wall in shown]
+    kept = tuple(part for part in problem.scene.boundary if part not in replaced)
+    return _stating(problem, (*kept, *shown))
+
+
+def _stating(problem: Problem, boundary: tuple[BoundaryInformation, ...]) -> Problem:
+    scene = replace(problem.scene, boundary=boundary)
     return Problem(scene, problem.shifts, problem.planes, problem.sensors, problem.images)
+
+
+def _wall(plane: PlaneData, stated: Wall | None) -> MeasuredWall:
+    """The wall that a plane shows; in openings, and at the rim, as the nearest wall beside them."""
+    still = still_vertices(plane)
+    nearest = ndimage.distance_transform_edt(~still, return_distances=False, return_indices=True)
+    place_k = plane.temperature_k[tuple(nearest)]
+    return MeasuredWall(
+        wall=plane.wall,  # type: ignore[arg-type]
+        no_slip=stated is None or stated.no_slip,
+        thermal="temperature",
+        temperature_k=float(plane.temperature_k[still].mean()),
+        temperature_std_k=PLANE_NOISE_K,
+        first_m=tuple(float(m) for m in plane.first_m),
+        second_m=tuple(float(m) for m in plane.second_m),
+        place_k=tuple(tuple(float(k) for k in row) for row in place_k),
+    )
 
 
 def plane_openings(plane: PlaneData) -> list[Inlet | Outlet]:
@@ -54,10 +131,10 @@ def plane_openings(plane: PlaneData) -> list[Inlet | Outlet]:
 
 
 def air_planes(problem: Problem) -> list[PlaneData]:
-    """Planes on walls whose temperature is not stated. A plane on another wall shows what was stated, and no air."""
+    """Planes on walls that pass no heat: they show the air. Any other plane shows its wall."""
     walls = stated_walls(problem.scene)
-    held = {name for name, wall in walls.items() if wall is not None and wall.thermal == "temperature"}
-    return [plane for plane in problem.planes if plane.wall not in held]
+    none = {name for name, wall in walls.items() if wall is not None and wall.thermal == "adiabatic"}
+    return [plane for plane in problem.planes if plane.wall in none]
 
 
 def profiles(problem: Problem) -> list[PlaneData]:

@@ -74,9 +74,7 @@ def solution(
     """The result: fields, standard deviations, and sentences after `notes`; T with its last correction."""
     fields, box, problem = analysis.best.fields, analysis.problem.scene.room, analysis.problem
     free = free_vertices(analysis.layout, fields.excess_k.shape)
-    change = last_correction(
-        analysis.data, analysis.prior, analysis.derivatives, fields, analysis.outlet_std_k
-    )
+    change = last_correction(analysis.data, analysis.derivatives, fields, analysis.outlet_std_k)
     x, y, z = (np.linspace(box.lower_m[a], box.upper_m[a], n) for a, n in enumerate(fields.excess_k.shape))
     change_k = change.excess_k * free if use_images else np.zeros_like(free)
     moved_k = float(layer_means(change_k).mean())

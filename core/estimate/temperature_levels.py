@@ -11,7 +11,6 @@ from core.estimate.explained import explained
 from core.estimate.forward_runs import Derivatives
 from core.estimate.model_error import EACH
 from core.estimate.observation import Observations
-from core.estimate.prior import Prior
 from core.geometry import WALLS, Box, Face, face_of
 from core.known import stated_walls
 from core.room.boundary_conditions import RoomLayout
@@ -25,7 +24,7 @@ _LEAST_DEPARTURE_K = 1e-3
 
 
 def last_correction(
-    data: Observations, prior: Prior, derivatives: Derivatives, fields: RoomFields, outlet_std_k: float
+    data: Observations, derivatives: Derivatives, fields: RoomFields, outlet_std_k: float
 ) -> Correction:
     """The correction of T for these fields (`core.estimate.discrepancy`).
 
@@ -35,8 +34,7 @@ def last_correction(
     level_k = max(own_k, level_std_k(derivatives))
     residual = data.values()[0] - data.predicted(fields)
     wrong = explained(data, fields).left_over_own
-    walls = prior.unknown_walls()
-    return temperature_correction(data, fields.excess_k, residual, own_k, level_k, wrong, walls, outlet_std_k)
+    return temperature_correction(data, fields.excess_k, residual, own_k, level_k, wrong, outlet_std_k)
 
 
 def outlets_apart_k(
@@ -130,16 +128,14 @@ def surfaces_std_k(
 
     A wall of stated temperature shows it, and may be off by its stated deviation. One of unknown temperature shows
     the air beside it, as an adiabatic wall would. It may be as far from that as the fit has it: its heat is fitted,
-    and what its surface has depends on how heat passes the layer on it, which no picture sees. A measured plane sees
-    it.
+    and what its surface has depends on how heat passes the layer on it, which no picture sees.
     """
     std_k = np.zeros(excess_k.shape)
-    seen = [plane.wall for plane in data.planes]
     for index, (name, wall) in enumerate(stated_walls(data.scene).items()):
         plane = _plane(face_of(name))
         if wall is not None and wall.temperature_k is not None:
             apart_k = np.full_like(excess_k[plane], wall.temperature_std_k)
-        elif layout.heated[index] and not layout.own[index] and name not in seen:
+        elif layout.heated[index] and not layout.own[index]:
             apart_k = np.abs(float(np.asarray(wall_excess_k)[index]) - excess_k[plane])
         else:
             continue

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from core.air import Air
 from core.estimate.forward_runs import RoomSettings, run_as_stated
 from core.estimate.marches import Marches
-from core.estimate.plane_openings import with_plane_openings
+from core.estimate.plane_openings import with_planes_read
 from core.estimate.prior import room_prior
 from core.fields import SplineField, plume, through_vertices
 from core.known_temperature import VertexGrid
@@ -92,7 +92,7 @@ def expected_flow(problem: Problem, excess_k: float | None = None) -> ExpectedFl
             f"The expected contrast is {excess_k:g} K; expected a temperature difference above 0 and below "
             "5000 K, such as 10."
         )
-    problem = with_plane_openings(problem)
+    problem = with_planes_read(problem)
     known = largest_contrast_k(problem)
     if any(isinstance(b, Driving) for b in problem.scene.boundary) and known:
         marched = _marched(problem)

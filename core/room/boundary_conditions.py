@@ -11,21 +11,34 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from core.air import Air
-from core.geometry import WALLS, face_of
+from core.geometry import WALLS, WallName, face_of
 from core.known import outlet_shares, refuse_outward, refuse_overlaps, stated_walls, supplied_m3_s
 from core.objects import RoomObject
 from core.room.openings import Opening, lay_patch, supply_turbulence
 from core.room.room_grid import AXES, RoomGrid
 from core.room.solids import Solids, SurfaceHeat, lay_objects
+from core.room.vertices import linear_matrix
 from core.room.wall_planes import Boundary, WallPlane, closed_wall
-from core.scene import Heater, Inlet, OnPatch, Outlet, Scene
-from core.setting import SettingError
+from core.scene import Heater, Inlet, OnPatch, Outlet, Scene, Wall
+from core.setting import SettingError, setting
 from core.significance import EITHER_WAY
 from core.view_frame import passed_walls
 
 
 class SuspectedHeater(Heater):
     """A heater that nobody stated: its heat is fitted. Its temperature alone has no meaning and is not shown."""
+
+
+@setting
+class MeasuredWall(Wall):
+    """A wall whose temperature a plane shows from place to place; `temperature_k` is the mean.
+
+    Places are rows along the first of the wall's axes (in the order x, y, z) and columns along the second.
+    """
+
+    first_m: tuple[float, ...]
+    second_m: tuple[float, ...]
+    place_k: tuple[tuple[float, ...], ...]
 
 
 class RoomParameters(eqx.Module):
@@ -57,7 +70,8 @@ class RoomLayout(eqx.Module):
     `outlet_shares`: of the air that leaves, the share that leaves by each outlet. `shown`: whether vertices on a
     heater get its temperature. `heated`, `no_slip`, `held`: of each wall, 1 if heat passes it, if air sticks to it,
     and if its temperature is stated. `own`: 1 if its vertices show its own temperature and not the air's: a stated
-    one, and a fitted one where a camera looks through the wall or at it.
+    one, and a fitted one where a camera looks through the wall or at it. `apart_k`: how far each face of each wall is
+    from the wall's temperature.
     `solids` are the objects in the room, and `objects` those of the scene; None and empty where there are none.
     """
 
@@ -73,6 +87,7 @@ class RoomLayout(eqx.Module):
     no_slip: Float[np.ndarray, "6"]
     held: Float[np.ndarray, "6"]
     own: Float[np.ndarray, "6"]
+    apart_k: tuple[Float[np.ndarray, "_ _"], ...]
     notes: tuple[str, ...] = eqx.field(static=True)
     objects: tuple[RoomObject, ...] = eqx.field(static=True, default=())
     solids: Solids | None = None
@@ -131,6 +146,7 @@ def room_layout(scene: Scene, grid: RoomGrid) -> RoomLayout:
         no_slip,
         held,
         np.maximum(held, heated * _in_sight(scene)),
+        tuple(_apart_k(wall, name, grid) for name, wall in walls.items()),
         tuple(notes),
         scene.objects,
         solids,
@@ -145,6 +161,19 @@ def _in_sight(scene: Scene) -> Float[np.ndarray, "6"]:
     """
     passed = [passed_walls(view, scene.room) for view in scene.views]
     return np.array([float(any(name in walls for walls in passed)) for name in WALLS])
+
+
+def _apart_k(wall: Wall | None, name: WallName, grid: RoomGrid) -> Float[np.ndarray, "first second"]:
+    """How far the faces of a wall are from its temperature: zero, but where a plane shows more."""
+    if not isinstance(wall, MeasuredWall):
+        return np.zeros(grid.plane(face_of(name).axis), np.float32)
+    first, second = face_of(name).along
+    rows, columns = (
+        linear_matrix(np.asarray(at_m), grid.centres_m(axis))
+        for axis, at_m in ((first, wall.first_m), (second, wall.second_m))
+    )
+    place_k = np.asarray(wall.place_k) - wall.temperature_k
+    return (rows @ place_k @ columns.T).astype(np.float32)
 
 
 def boundary(layout: RoomLayout, parameters: RoomParameters) -> Boundary:
@@ -242,7 +271,7 @@ def _bare(layout: RoomLayout, wall: int, parameters: RoomParameters) -> WallPlan
     conductance = (
         float(layout.heated[wall]) * closed * jnp.exp(parameters.log_heat + parameters.wall_log_heat[wall])
     )
-    heat = conductance * parameters.wall_excess_k[wall]
+    heat = conductance * (parameters.wall_excess_k[wall] + layout.apart_k[wall])
     held = jnp.full_like(conductance, layout.own[wall])
     for n, opening in enumerate(layout.heaters):
         if opening.wall == wall:

@@ -37,7 +37,7 @@ from core.estimate.marches import Marches, work
 from core.estimate.observation import Observations, observations
 from core.estimate.parameter_fit import Background, Fit, search
 from core.estimate.parameter_step import Vector, misfit_ratio
-from core.estimate.plane_openings import with_plane_openings
+from core.estimate.plane_openings import refuse_walls_alone, with_planes_read
 from core.estimate.posterior import Analysis, solution
 from core.estimate.prior import room_prior
 from core.estimate.schedule import fit_work
@@ -77,7 +77,8 @@ def background_of(
 
     `closure` replaces the scene's.
     """
-    problem = with_plane_openings(problem)
+    problem = with_planes_read(problem)
+    refuse_walls_alone(problem)
     closure = closure or closure_name(problem.scene)
     coarse, fine = (room(problem.scene, n, closure) for n in (settings.coarse_cells, settings.cells))
     vertices = (settings.vertices, settings.vertices, settings.vertices)

@@ -80,8 +80,8 @@ def test_what_leaves_is_the_mean_of_the_thermometers_weighted_as_the_flow_divide
     assert leaving_excess_k(problem(*outlets)) == pytest.approx(leaving_k)
 
 
-@pytest.mark.parametrize("thermal", ["temperature", "adiabatic"])
-def test_a_plane_on_a_wall_of_stated_temperature_tells_nothing_of_the_air(thermal):
+@pytest.mark.parametrize("thermal", ["temperature", "unknown", "adiabatic"])
+def test_a_plane_tells_of_the_air_on_a_wall_that_passes_no_heat_alone(thermal):
     given, along_m = problem(HIGH), np.linspace(0.0, 2.0, 21)
     still = np.zeros((21, 21))
     plane = PlaneData("x_max", along_m, along_m, still + 300.0, still, np.zeros((21, 21, 3)))
