@@ -191,7 +191,11 @@ class View:
 
 @setting
 class PlaneField:
-    """T, p, u known on a plane across the room: an NPZ of y, z, T, p, u (and mask) in the experiment."""
+    """T, p, u known all over a wall: an NPZ of y, z, T, p, u (and mask) in the experiment.
+
+    T is that of the wall's surface, and of the air in openings. On a wall that is stated to be adiabatic it is that
+    of the air beside it.
+    """
 
     kind: Literal["plane_field"] = "plane_field"
     file: str

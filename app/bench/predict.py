@@ -77,7 +77,7 @@ def solved(path: Path, options: RigOptions, information: Information, preset: st
     return {
         "noise_px": float(np.sqrt(np.mean(noise**2))),
         "solver_s": found.solver_s,
-        "T_K": scores["T"]["rms_K"],
+        "T_K": scores["T"]["air"]["rms_K"],
         "u": scores["u"] and scores["u"]["rel"],
     }
 

@@ -155,9 +155,10 @@ def solved(
         "method": point.method, "preset": point.preset, "cells": point.cells, "frames": point.frames,
         "solver_s": round(found.solver_s, 2),
         "T_K": round(scores["T"]["rms_K"], 4), "T_share": round(scores["T"]["rms_K"] / scale_k, 3),
+        "T_air_share": round(scores["T"]["air"]["rms_K"] / scale_k, 3),
         "T_departure": _rounded(scores["T"]["departure_of_departures"]), "misread": misread_by,
         "u": _rounded(scores["u"] and scores["u"]["rel"]), "p": _rounded(scores["p"] and scores["p"]["rel"]),
-        "outcome": found.outcome.name,
+        "outcome": found.outcome.name, "distrusts": any("distrust the velocity" in note for note in found.notes),
     }  # fmt: skip
 
 

@@ -119,7 +119,7 @@ def departure_k(flow: ExpectedFlow) -> float:
 
 
 def preset_lines(problem: Problem, flow: ExpectedFlow) -> list[PresetLine]:
-    """Every preset: time and memory by this machine's figures and runs, error from the reference rooms."""
+    """Every preset: time and memory by this machine's figures and runs, errors from the committed rows."""
     return [_preset_line(name, problem, flow) for name in PRESETS]
 
 
@@ -142,16 +142,21 @@ def _preset_line(name: str, problem: Problem, flow: ExpectedFlow) -> PresetLine:
         temperature_error_k=known.temperature * departure_k(flow) if known else None,
         velocity_error=known.velocity if known else None,
         pressure_error=known.pressure if known else None,
-        reason=_preset_reason(fits, known),
+        reason=_preset_reason(fits, known, departure_k(flow)),
     )
 
 
-def _preset_reason(fits: bool, known: ExpectedError | None) -> str:
+def _preset_reason(fits: bool, known: ExpectedError | None, departures_k: float) -> str:
     if not fits:
-        return "needs what drives the air: an inlet or a heater in the scene, or a plane with openings"
+        return (
+            "needs what drives the air: an inlet or a heater in the scene, or a plane that shows all openings"
+        )
     if known is None:
-        return "no reference room was solved with this knowledge and light"
-    return f"error from {known.rooms} runs on reference rooms, times the expected departures"
+        return "no room was solved with this knowledge and light"
+    of = "rooms that nothing was set on" if known.unseen else "the rooms that the settings were chosen on"
+    worst = "" if known.worst_velocity is None else f" and velocity by {100 * known.worst_velocity:.0f} %"
+    worst_k = known.worst_temperature * departures_k
+    return f"medians of {known.rooms} {of}; in the worst of them T would be off by {worst_k:.2g} K{worst}"
 
 
 def signals_of(problem: Problem, flow: ExpectedFlow) -> tuple[Signal, ...]:

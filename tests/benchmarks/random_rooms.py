@@ -240,7 +240,7 @@ def _entered(problem: Problem, number: int, heater: Any, wrong: float) -> Proble
         scene = replace(scene, boundary=(*scene.boundary, heater))
     scene = misread(scene, number)
     inlets = [part for part in scene.boundary if isinstance(part, Inlet)]
-    most = max(inlets, key=lambda inlet: inlet.inward_m_s * inlet.patch.area_m2)
+    most = max(inlets, key=lambda inlet: inlet.inward_m_s * inlet.patch.area_m2, default=None)
     ambient_k = scene.air.ambient_temperature_k
     boundary = tuple(mistaken(most, wrong, ambient_k) if part is most else part for part in scene.boundary)
     return with_scene(problem, replace(scene, boundary=boundary))

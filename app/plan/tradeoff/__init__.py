@@ -1,6 +1,8 @@
-"""What each preset bought on the reference rooms: the committed rows of `airlens bench tradeoff`.
+"""What each preset bought: the committed rows of `airlens bench tradeoff`.
 
-The plan's predictions, the README's table and the operator's page read the same rows.
+`rows.jsonl` is the whole sweep over the reference rooms A and C, on which the fit's settings were chosen;
+`unseen.jsonl` the presets alone on rooms that nothing was set on, with entries as wrong as their deviations say
+(`--presets --misread 1`). The plan's predictions, the README's table and the operator's page read both.
 """
 
 import json
@@ -10,37 +12,53 @@ from typing import Any
 
 import numpy as np
 
-ROWS = Path(__file__).resolve().parent / "rows.jsonl"
+ROWS, UNSEEN = (Path(__file__).resolve().parent / name for name in ("rows.jsonl", "unseen.jsonl"))
 
 
 @dataclass(frozen=True)
 class ExpectedError:
-    """Median errors over rooms: T over the departures' rms, u and p relative; `rooms` is how many runs."""
+    """Median errors over rooms: T of the air over the departures' rms, u and p relative; `rooms` is how many runs.
+
+    `worst_temperature`, `worst_velocity`: those of the worst room. `unseen`: nothing was set on these rooms, and
+    entries were wrong as their deviations say.
+    """
 
     temperature: float
     velocity: float | None
     pressure: float | None
+    worst_temperature: float
+    worst_velocity: float | None
     rooms: int
+    unseen: bool
 
 
-def rows(path: Path = ROWS) -> list[dict[str, Any]]:
-    """The committed rows; empty before the first sweep."""
-    if not path.is_file():
-        return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+def rows(*paths: Path) -> list[dict[str, Any]]:
+    """The rows of these files, or of the committed sweep over the reference rooms."""
+    lines = [line for path in paths or (ROWS,) for line in path.read_text(encoding="utf-8").splitlines()]
+    return [json.loads(line) for line in lines if line.strip()]
 
 
 def expected_error(preset: str, level: str, light: str) -> ExpectedError | None:
-    """What a preset left on the reference rooms with that knowledge and light; None without such a row."""
-    fitting = [r for r in rows() if (r["preset"], r["level"], r["light"]) == (preset, level, light)]
+    """What a preset left with that knowledge and light in `judged` rooms; None without such a row."""
+    asked = preset, level, light
+    fitting = judged([r for r in rows(ROWS, UNSEEN) if (r["preset"], r["level"], r["light"]) == asked])
     if not fitting:
         return None
+    shares = [r["T_air_share"] for r in fitting if r["T_air_share"] is not None]
     return ExpectedError(
-        temperature=float(np.median([r["T_share"] for r in fitting])),
+        temperature=float(np.median(shares)),
         velocity=_median(fitting, "u"),
         pressure=_median(fitting, "p"),
+        worst_temperature=max(shares),
+        worst_velocity=max((r["u"] for r in fitting if r["u"] is not None), default=None),
         rooms=len(fitting),
+        unseen=fitting[0]["misread"] is not None,
     )
+
+
+def judged(alike: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Of rows that differ in the room alone, those of rooms that nothing was set on, if there are any."""
+    return [row for row in alike if row.get("misread") is not None] or alike
 
 
 def _median(fitting: list[dict[str, Any]], name: str) -> float | None:
@@ -89,19 +107,23 @@ def headline(rows: list[dict[str, Any]]) -> str:
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """The presets as a Markdown table: medians over rooms, one line a preset, level and light."""
+    """The presets as a Markdown table: medians over `judged` rooms, one line a preset, level and light."""
     lines = [
         "| preset | information | light | solver | T error over departures | u error | p error | rooms |",
         "|---|---|---|---|---|---|---|---|",
     ]
     named = [row for row in rows if row["preset"]]
     for key in dict.fromkeys((r["preset"], r["information"], r["light"]) for r in named):
-        own = [r for r in named if (r["preset"], r["information"], r["light"]) == key]
+        own = judged([r for r in named if (r["preset"], r["information"], r["light"]) == key])
         solver_s = float(np.median([r["solver_s"] for r in own]))
-        share = float(np.median([r["T_share"] for r in own]))
-        u, p = (_median(own, name) for name in ("u", "p"))
-        told = ["-" if value is None else f"{value:.2f}" for value in (u, p)]
-        lines.append(
-            f"| {' | '.join(key)} | {solver_s:.0f} s | {share:.2f} | {' | '.join(told)} | {len(own)} |"
-        )
+        told = [_median(own, name) for name in ("T_air_share", "u", "p")]
+        shown = ["-" if value is None else f"{value:.2f}" for value in told]
+        lines.append(f"| {' | '.join(key)} | {solver_s:.0f} s | {' | '.join(shown)} | {_which(own)} |")
     return "\n".join(lines) + "\n"
+
+
+def _which(own: list[dict[str, Any]]) -> str:
+    """How many random rooms these are, or the names of those that settings were chosen on."""
+    if own[0].get("misread") is not None:
+        return f"{len(own)} random"
+    return ", ".join(row["room"] for row in own)
