@@ -100,8 +100,8 @@ def _stating(problem: Problem, boundary: tuple[BoundaryInformation, ...]) -> Pro
 def _wall(plane: PlaneData, stated: Wall | None) -> MeasuredWall:
     """The wall that a plane shows; in openings, and at the rim, as the nearest wall beside them."""
     still = still_vertices(plane)
-    nearest = ndimage.distance_transform_edt(~still, return_distances=False, return_indices=True)
-    place_k = plane.temperature_k[tuple(nearest)]
+    nearest = np.asarray(ndimage.distance_transform_edt(~still, return_distances=False, return_indices=True))
+    place_k = plane.temperature_k[nearest[0], nearest[1]]
     return MeasuredWall(
         wall=plane.wall,  # type: ignore[arg-type]
         no_slip=stated is None or stated.no_slip,

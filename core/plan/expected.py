@@ -16,6 +16,7 @@ from core.estimate.marches import Marches
 from core.estimate.plane_openings import with_planes_read
 from core.estimate.prior import room_prior
 from core.fields import SplineField, plume, through_vertices
+from core.known import measured_outlets
 from core.known_temperature import VertexGrid
 from core.plan.averaging import Fluctuation, fluctuation
 from core.problem import Problem
@@ -69,7 +70,7 @@ class ExpectedFlow:
 
 
 def largest_contrast_k(problem: Problem) -> float | None:
-    """The largest stated |T - T0|, from inlets, heaters, walls, planes and sensors; None where nothing is stated."""
+    """The largest stated |T - T0|, of inlets, outlets, heaters, walls, planes and sensors; None where none is."""
     return max((abs(excess) for excess in _stated_excesses_k(problem)), default=None)
 
 
@@ -77,6 +78,7 @@ def _stated_excesses_k(problem: Problem) -> list[float]:
     stated = [b.temperature_k for b in problem.scene.boundary if isinstance(b, Inlet | Heater)]
     walls = [b.temperature_k for b in problem.scene.boundary if isinstance(b, Wall)]
     stated += [t for t in walls if t is not None]
+    stated += [kelvin for *_, kelvin in measured_outlets(problem.scene)]
     stated += [float(t) for plane in problem.planes for t in np.percentile(plane.temperature_k, [0.5, 99.5])]
     stated += [float(t) for sensor in problem.sensors for t in sensor.temperature_k if np.isfinite(t)]
     return [t - problem.scene.air.ambient_temperature_k for t in stated]

@@ -165,6 +165,19 @@ def test_supply_and_walls_are_marched():
     assert 0 < flow.excess_k.max() <= 10.0 + 1e-3
 
 
+def test_air_that_leaves_warmer_than_it_came_is_not_cut_to_its_supply():
+    inlet = Inlet(
+        patch=Patch(wall="x_min", lower_m=(1.2, 2.0), upper_m=(1.8, 2.6)),
+        temperature_k=293.65,
+        velocity_m_s=(0.5, 0.0, 0.0),
+    )
+    outlet = replace(known_outlet(), mean_temperature_k=296.15)
+    found = expected_flow(Problem(replace(bench(), boundary=(inlet, outlet), air=Air()), ()))
+    # Unknown walls warm the air from the supply's 0.5 K towards the 3 K that leave.
+    assert 1.0 < found.excess_k.max() <= 3.0 + 1e-3
+    assert np.ptp(found.excess_k[1:-1, 1:-1, 15]) > 0.05
+
+
 @pytest.mark.parametrize("excess_k", [0.0, -3.0, float("nan"), 1e5])
 def test_a_contrast_that_cannot_be_is_refused(excess_k: float):
     with pytest.raises(SettingError, match="above 0 and below"):
