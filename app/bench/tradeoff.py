@@ -26,6 +26,7 @@ from app.volume.score import score_solution
 from core.estimate.forward_runs import RoomSettings
 from core.known import level_of
 from core.metrics import departure, inner, rms
+from core.plan.expected import largest_contrast_k
 from core.problem import Problem
 from core.result import Solution
 from core.setting import SettingError
@@ -156,6 +157,7 @@ def solved(
         "solver_s": round(found.solver_s, 2),
         "T_K": round(scores["T"]["rms_K"], 4), "T_share": round(scores["T"]["rms_K"] / scale_k, 3),
         "T_air_share": round(scores["T"]["air"]["rms_K"] / scale_k, 3),
+        "T_air_contrast": round(scores["T"]["air"]["rms_K"] / (largest_contrast_k(problem) or scale_k), 4),
         "T_departure": _rounded(scores["T"]["departure_of_departures"]), "misread": misread_by,
         "u": _rounded(scores["u"] and scores["u"]["rel"]), "p": _rounded(scores["p"] and scores["p"]["rel"]),
         "outcome": found.outcome.name, "distrusts": any("distrust the velocity" in note for note in found.notes),

@@ -33,7 +33,7 @@ from core.known import level_of
 from core.metrics import departure, inner, rms
 from core.plan.averaging import Fluctuation
 from core.plan.choice import Choice
-from core.plan.expected import ExpectedFlow, expected_flow
+from core.plan.expected import ExpectedFlow, expected_flow, largest_contrast_k
 from core.plan.observability import seen
 from core.plan.places import place_map
 from core.plan.second_light import SecondLight, second_light
@@ -83,7 +83,7 @@ def plan(folder: Path, *, excess_k: float | None = None, on_stage: OnStage = lam
         ),
         averaging=_averaging(flow.fluctuation),
         choices=[_choice_line(choice) for choice in choices],
-        presets=preset_lines(problem, flow),
+        presets=preset_lines(problem, flow, excess_k),
         machine=source(),
         verdicts=[
             in_short(max(view.picture_signal_to_noise for view in views)),
@@ -118,12 +118,16 @@ def departure_k(flow: ExpectedFlow) -> float:
     return rms(departure(inner(flow.excess_k)))
 
 
-def preset_lines(problem: Problem, flow: ExpectedFlow) -> list[PresetLine]:
-    """Every preset: time and memory by this machine's figures and runs, errors from the committed rows."""
-    return [_preset_line(name, problem, flow) for name in PRESETS]
+def preset_lines(problem: Problem, flow: ExpectedFlow, excess_k: float | None = None) -> list[PresetLine]:
+    """Every preset: time and memory by this machine's figures and runs, errors from the committed rows.
+
+    `excess_k` is the largest contrast where another one than the stated is asked for.
+    """
+    contrast_k = excess_k or largest_contrast_k(problem) or float(np.abs(flow.excess_k).max())
+    return [_preset_line(name, problem, flow, contrast_k) for name in PRESETS]
 
 
-def _preset_line(name: str, problem: Problem, flow: ExpectedFlow) -> PresetLine:
+def _preset_line(name: str, problem: Problem, flow: ExpectedFlow, contrast_k: float) -> PresetLine:
     speeds = this_machine()[0].speeds
     fits = flow.step_s is not None or name not in ("standard", "reference")
     known = expected_error(name, level_of(problem), problem.scene.light.kind) if fits else None
@@ -139,14 +143,14 @@ def _preset_line(name: str, problem: Problem, flow: ExpectedFlow) -> PresetLine:
         work=task.work,
         programs=task.programs,
         memory_mb=speeds[name].megabytes(work) if work is not None and name in speeds else None,
-        temperature_error_k=known.temperature * departure_k(flow) if known else None,
+        temperature_error_k=known.temperature * contrast_k if known else None,
         velocity_error=known.velocity if known else None,
         pressure_error=known.pressure if known else None,
-        reason=_preset_reason(fits, known, departure_k(flow)),
+        reason=_preset_reason(fits, known, contrast_k),
     )
 
 
-def _preset_reason(fits: bool, known: ExpectedError | None, departures_k: float) -> str:
+def _preset_reason(fits: bool, known: ExpectedError | None, contrast_k: float) -> str:
     if not fits:
         return (
             "needs what drives the air: an inlet or a heater in the scene, or a plane that shows all openings"
@@ -155,7 +159,7 @@ def _preset_reason(fits: bool, known: ExpectedError | None, departures_k: float)
         return "no room was solved with this knowledge and light"
     of = "rooms that nothing was set on" if known.unseen else "the rooms that the settings were chosen on"
     worst = "" if known.worst_velocity is None else f" and velocity by {100 * known.worst_velocity:.0f} %"
-    worst_k = known.worst_temperature * departures_k
+    worst_k = known.worst_temperature * contrast_k
     return f"medians of {known.rooms} {of}; in the worst of them T would be off by {worst_k:.2g} K{worst}"
 
 

@@ -17,7 +17,7 @@ ROWS, UNSEEN = (Path(__file__).resolve().parent / name for name in ("rows.jsonl"
 
 @dataclass(frozen=True)
 class ExpectedError:
-    """Median errors over rooms: T of the air over the departures' rms, u and p relative; `rooms` is how many runs.
+    """Median errors over rooms: T of the air over the largest stated contrast, u and p relative, of `rooms` runs.
 
     `worst_temperature`, `worst_velocity`: those of the worst room. `unseen`: nothing was set on these rooms, and
     entries were wrong as their deviations say.
@@ -44,7 +44,7 @@ def expected_error(preset: str, level: str, light: str) -> ExpectedError | None:
     fitting = judged([r for r in rows(ROWS, UNSEEN) if (r["preset"], r["level"], r["light"]) == asked])
     if not fitting:
         return None
-    shares = [r["T_air_share"] for r in fitting if r["T_air_share"] is not None]
+    shares = [r["T_air_contrast"] for r in fitting if r["T_air_contrast"] is not None]
     return ExpectedError(
         temperature=float(np.median(shares)),
         velocity=_median(fitting, "u"),

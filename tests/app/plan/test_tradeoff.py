@@ -52,7 +52,7 @@ def test_predictions_are_medians_over_rooms_that_nothing_was_set_on():
     assert known is not None
     assert known.unseen
     assert known.rooms == len(own) >= 5
-    shares = [r["T_air_share"] for r in own if r["T_air_share"] is not None]
+    shares = [r["T_air_contrast"] for r in own if r["T_air_contrast"] is not None]
     assert known.temperature == np.median(shares)
     assert known.velocity == np.median([r["u"] for r in own])
     assert (known.worst_temperature, known.worst_velocity) == (
