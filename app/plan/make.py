@@ -157,10 +157,11 @@ def _preset_reason(fits: bool, known: ExpectedError | None, contrast_k: float) -
         )
     if known is None:
         return "no room was solved with this knowledge and light"
-    of = "rooms that nothing was set on" if known.unseen else "the rooms that the settings were chosen on"
-    worst = "" if known.worst_velocity is None else f" and velocity by {100 * known.worst_velocity:.0f} %"
-    worst_k = known.worst_temperature * contrast_k
-    return f"medians of {known.rooms} {of}; in the worst of them T would be off by {worst_k:.2g} K{worst}"
+    of = "simulated rooms" if known.unseen else "simulated rooms that the settings were chosen on"
+    worst = f"T {known.worst_temperature * contrast_k:.2g} K"
+    if known.worst_velocity is not None:
+        worst += f", velocity {100 * known.worst_velocity:.0f} %"
+    return f"median of {known.rooms} {of}; the worst: {worst}"
 
 
 def signals_of(problem: Problem, flow: ExpectedFlow) -> tuple[Signal, ...]:
