@@ -38,6 +38,12 @@ def unknown_walls(scene: Scene) -> list[WallName]:
     return [name for name, wall in walls.items() if wall is None or wall.thermal == "unknown"]
 
 
+def passes_no_heat(scene: Scene, wall: WallName) -> bool:
+    """Whether the wall is stated to be adiabatic: a plane on it shows the air, on any other wall that wall."""
+    stated = stated_walls(scene)[wall]
+    return stated is not None and stated.thermal == "adiabatic"
+
+
 def level_of(problem: Problem) -> Level:
     """How much is known: what drives the air and all walls, what drives the air, a plane, or images alone."""
     if any(isinstance(part, Driving) for part in problem.scene.boundary):

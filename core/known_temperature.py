@@ -13,7 +13,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from core.data_error import PLANE_ON_VERTICES_K
 from core.geometry import Box, WallName, face_of
-from core.known import stated_walls
+from core.known import passes_no_heat
 from core.problem import PlaneData, Problem
 from core.scene import Heater, Inlet, Outlet, Patch, Scene
 
@@ -97,7 +97,7 @@ def known_temperature(problem: Problem, grid: VertexGrid) -> KnownTemperature:
         kelvin = plane_on_grid(grid, plane, plane.temperature_k)
         entering, leaving = _passing(grid, plane)
         entering_k += list(kelvin[entering])
-        if _passes_no_heat(problem.scene, wall):
+        if passes_no_heat(problem.scene, wall):
             air = ~(entering | _heated(problem.scene, grid, wall))
             # The plane's rim lies in the thermal layers of the four neighbouring walls.
             on_wall(wall, mask)[1:-1, 1:-1] = air[1:-1, 1:-1]
@@ -150,11 +150,6 @@ def known_air_k(problem: Problem) -> list[float]:
             case _:
                 pass
     return kelvin
-
-
-def _passes_no_heat(scene: Scene, wall: WallName) -> bool:
-    stated = stated_walls(scene)[wall]
-    return stated is not None and stated.thermal == "adiabatic"
 
 
 def _heated(scene: Scene, grid: VertexGrid, wall: WallName) -> Bool[np.ndarray, "first second"]:

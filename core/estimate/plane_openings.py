@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from core.data_error import PLANE_NOISE_K
 from core.geometry import Vector2, face_of
-from core.known import measured_outlets, share_area, stated_walls, unknown_walls
+from core.known import measured_outlets, passes_no_heat, share_area, stated_walls, unknown_walls
 from core.problem import PlaneData, Problem
 from core.room.boundary_conditions import MeasuredWall
 from core.scene import BoundaryInformation, Driving, Heater, Inlet, Outlet, Patch, Wall
@@ -49,14 +49,13 @@ def _with_openings(problem: Problem) -> Problem:
 
 
 def passing_m3_s(problem: Problem) -> tuple[float, float]:
-    """What enters by the planes, and what leaves by them."""
+    """Volume flows that enter, and that leave, by the planes."""
     entering = leaving = 0.0
     for plane in problem.planes:
         face = face_of(plane.wall)
         inward = face.inward * plane.velocity_m_s[..., face.axis]
-        area_m2 = np.outer(_widths(plane.first_m), _widths(plane.second_m))
-        entering += float((np.maximum(inward, 0.0) * area_m2).sum())
-        leaving += float((np.maximum(-inward, 0.0) * area_m2).sum())
+        entering += float((np.maximum(inward, 0.0) * _areas_m2(plane)).sum())
+        leaving += float((np.maximum(-inward, 0.0) * _areas_m2(plane)).sum())
     return entering, leaving
 
 
@@ -84,7 +83,7 @@ def refuse_walls_alone(problem: Problem) -> None:
 def _with_walls(problem: Problem) -> Problem:
     """The problem with the temperature of each wall on which a plane lies, if nobody stated what heat passes it."""
     walls, unknown = stated_walls(problem.scene), unknown_walls(problem.scene)
-    shown = [_wall(plane, walls[plane.wall]) for plane in problem.planes if plane.wall in unknown]
+    shown = [_measured(plane, walls[plane.wall]) for plane in problem.planes if plane.wall in unknown]
     if not shown:
         return problem
     replaced = [walls[wall.wall] for wall in shown]
@@ -97,7 +96,7 @@ def _stating(problem: Problem, boundary: tuple[BoundaryInformation, ...]) -> Pro
     return Problem(scene, problem.shifts, problem.planes, problem.sensors, problem.images)
 
 
-def _wall(plane: PlaneData, stated: Wall | None) -> MeasuredWall:
+def _measured(plane: PlaneData, stated: Wall | None) -> MeasuredWall:
     """The wall that a plane shows; in openings, and at the rim, as the nearest wall beside them."""
     still = still_vertices(plane)
     nearest = np.asarray(ndimage.distance_transform_edt(~still, return_distances=False, return_indices=True))
@@ -132,9 +131,7 @@ def plane_openings(plane: PlaneData) -> list[Inlet | Outlet]:
 
 def air_planes(problem: Problem) -> list[PlaneData]:
     """Planes on walls that pass no heat: they show the air. Any other plane shows its wall."""
-    walls = stated_walls(problem.scene)
-    none = {name for name, wall in walls.items() if wall is not None and wall.thermal == "adiabatic"}
-    return [plane for plane in problem.planes if plane.wall in none]
+    return [plane for plane in problem.planes if passes_no_heat(problem.scene, plane.wall)]  # type: ignore[arg-type]
 
 
 def profiles(problem: Problem) -> list[PlaneData]:
@@ -163,8 +160,7 @@ def _opening(
     lower: Vector2 = (f0, s0)
     upper: Vector2 = (f1, s1)
     patch = Patch(wall=plane.wall, lower_m=lower, upper_m=upper)  # type: ignore[arg-type]
-    area = np.outer(_widths(plane.first_m), _widths(plane.second_m))
-    flow = through_m_s * area
+    flow = through_m_s * _areas_m2(plane)
     weight = np.where(core, flow, 0.0)
     temperature_k = float((weight * plane.temperature_k).sum() / weight.sum())
     if not supplies:
@@ -195,6 +191,11 @@ def _crossing(
     before, after = float(profile[left]), float(profile[left + 1])
     share = float(np.clip((level - before) / (after - before), 0.0, 1.0)) if after != before else 0.5
     return float(axis_m[left] + share * (axis_m[left + 1] - axis_m[left]))
+
+
+def _areas_m2(plane: PlaneData) -> Float[np.ndarray, "first second"]:
+    """The area that each vertex stands for."""
+    return np.outer(_widths(plane.first_m), _widths(plane.second_m))
 
 
 def _widths(axis_m: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
