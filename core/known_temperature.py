@@ -16,6 +16,7 @@ from core.geometry import Box, WallName, face_of
 from core.known import passes_no_heat
 from core.problem import PlaneData, Problem
 from core.scene import Heater, Inlet, Outlet, Patch, Scene
+from core.setting import SettingError
 
 Volume = Float[np.ndarray, "nx ny nz"]
 # Of what is anywhere between two ends: its standard deviation over their distance.
@@ -121,6 +122,16 @@ def known_temperature(problem: Problem, grid: VertexGrid) -> KnownTemperature:
         std_k = max(EVEN_STD * (high_k - low_k), PLANE_ON_VERTICES_K)
         means = [(np.arange(mask.size), 0.5 * (low_k + high_k), std_k)]
     return KnownTemperature(mask, value, std, tuple(means))
+
+
+def refuse_without_level(known: KnownTemperature) -> None:
+    """Raise SettingError where nothing is known of the air: images see differences of temperature alone."""
+    if not known.mask.any() and not known.means:
+        raise SettingError(
+            "Nothing fixes the level of the temperature: deflections see only gradients. "
+            "Add an inlet, an outlet's mean temperature, a point sensor, or a plane field that air passes or whose "
+            "wall passes no heat."
+        )
 
 
 def _ends_k(problem: Problem, entering_k: list[float]) -> list[float]:

@@ -30,6 +30,7 @@ from app.reconstruct.presets import PRESETS
 from app.reconstruct.problem import known_of
 from core.displacement import resolve_window_px
 from core.known import level_of
+from core.known_temperature import known_temperature, refuse_without_level
 from core.metrics import departure, inner, rms
 from core.plan.averaging import Fluctuation
 from core.plan.choice import Choice
@@ -42,6 +43,8 @@ from core.plan.signal import Signal, other_light, shift_map, signal
 from core.plan.verdicts import blindness, broken, in_short, moving, offered, verdict
 from core.problem import Problem
 from core.scene import Scene
+from core.setting import SettingError
+from core.solve.draft.draft import draft_grid
 from core.view_frame import facing, turn_of
 
 OnStage = Callable[[str], object]
@@ -129,7 +132,8 @@ def preset_lines(problem: Problem, flow: ExpectedFlow, excess_k: float | None = 
 
 def _preset_line(name: str, problem: Problem, flow: ExpectedFlow, contrast_k: float) -> PresetLine:
     speeds = this_machine()[0].speeds
-    fits = flow.step_s is not None or name not in ("standard", "reference")
+    refused = _refused(name, problem, flow)
+    fits = refused is None
     known = expected_error(name, level_of(problem), problem.scene.light.kind) if fits else None
     work = work_of(name, problem, flow)
     task = task_of(name, problem, None if work is None else work.loops)
@@ -146,15 +150,25 @@ def _preset_line(name: str, problem: Problem, flow: ExpectedFlow, contrast_k: fl
         temperature_error_k=known.temperature * contrast_k if known else None,
         velocity_error=known.velocity if known else None,
         pressure_error=known.pressure if known else None,
-        reason=_preset_reason(fits, known, contrast_k),
+        reason=refused or _preset_reason(known, contrast_k),
     )
 
 
-def _preset_reason(fits: bool, known: ExpectedError | None, contrast_k: float) -> str:
-    if not fits:
+def _refused(name: str, problem: Problem, flow: ExpectedFlow) -> str | None:
+    """Why a preset would not solve the problem; None where it would."""
+    if name in ("standard", "reference") and flow.step_s is None:
         return (
             "needs what drives the air: an inlet or a heater in the scene, or a plane that shows all openings"
         )
+    if name == "draft":
+        try:
+            refuse_without_level(known_temperature(problem, draft_grid(problem.scene)))
+        except SettingError as refusal:
+            return str(refusal)
+    return None
+
+
+def _preset_reason(known: ExpectedError | None, contrast_k: float) -> str:
     if known is None:
         return "no room was solved with this knowledge and light"
     of = "simulated rooms" if known.unseen else "simulated rooms that the settings were chosen on"

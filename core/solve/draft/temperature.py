@@ -26,12 +26,11 @@ from core.air import Air
 from core.continuity import left_out, moved_as_air
 from core.drift import nearly_still
 from core.geometry import face_of
-from core.known_temperature import VertexGrid, known_temperature
+from core.known_temperature import VertexGrid, known_temperature, refuse_without_level
 from core.problem import Problem, ShiftMeasurement
 from core.rays.visibility import away_from_walls
 from core.result import Outcome, Solution
 from core.scene import ProjectedPattern
-from core.setting import SettingError
 from core.shared_errors import BROAD
 from core.solve.draft.conjugate_gradients import Product, conjugate_gradients
 from core.solve.draft.front_layers import front_layers_px
@@ -158,12 +157,7 @@ def _system(
     """
     air = problem.scene.air
     known = known_temperature(problem, grid)
-    if not known.mask.any() and not known.means:
-        raise SettingError(
-            "Nothing fixes the level of the temperature: deflections see only gradients. "
-            "Add an inlet, an outlet's mean temperature, a point sensor, or a plane field that air passes or whose "
-            "wall passes no heat."
-        )
+    refuse_without_level(known)
     # Kelvin to excess refractivity at ambient: only scales weights, never values.
     per_k = air.ambient_refractivity / air.ambient_temperature_k
     prior = excess(air, prior_temperature(problem, known, grid) - air.ambient_temperature_k)
