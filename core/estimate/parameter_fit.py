@@ -126,6 +126,5 @@ def settled(
     where, flow = fit.room.parameters, fit.room.flow.last
     room = march_under(fine, where, flow, settings.settle_s, data.vertices, marches, doing=_SETTLING)
     new = Fit(fit.posterior, room)
-    if before is None or misfit_ratio(data, room, before.room) < 1.0:
-        return new
-    return before.with_posterior_of(new)
+    worse = before is not None and misfit_ratio(data, room, before.room) >= 1.0
+    return before.with_posterior_of(new) if worse else new
