@@ -46,8 +46,6 @@ class RoomSettings:
 
     `jacobian_valid`, `renewals`: a Jacobian is computed anew once a parameter has moved this far from where it was
     computed, and so often at most.
-    `settle_s`: the march of the room as stated, from rest, and of a found room whose walls are unknown, until it is
-    that of its parameters.
     `restart_walls_s`: as `restart_s`, where walls are unknown: jets answer slowly to a wall.
     `fine_step`: rounds end when no parameter moves by more.
     `wall_heat`: multiplies the walls' heat coefficient from the heat balance, or the nominal one.

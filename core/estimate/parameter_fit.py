@@ -4,8 +4,7 @@ Derivatives are a coarse room's: one restart for each parameter. They are valid 
 fits worse is rejected, and the next step from the best one is shorter; every forward run updates the Jacobian
 (Broyden 1965), which is computed anew from time to time. Where walls are unknown, many parameters start far from the
 truth and compensate one another: each may be wrong by half the supply's excess temperature. There steps are damped
-from the beginning. Walls change slowly what they drive, and a march of a round ends before that: a room that fits
-well may be one on its way. So the best room is marched on before it is linearised anew, and at the end.
+from the beginning.
 """
 
 from collections.abc import Callable
@@ -26,7 +25,7 @@ from core.room.forward import Room
 # A round that leaves more than this share of the misfit has gained nothing; after so many of those the rounds end.
 _GAIN, _PATIENCE = 0.99, 2
 
-_DOING, _SETTLING = "search the fine room's parameters", "let the fine room settle"
+_DOING = "search the fine room's parameters"
 
 
 class Background(eqx.Module):
@@ -79,7 +78,6 @@ def search(
     linearised = best.posterior.vector
     grid_difference = data.predicted(best.room.fields) - data.predicted(derivatives.start)
     stale, renewals, trust_radius = 0, settings.renewals, longest
-    last_settled: Fit | None = None
     jacobian = derivatives.per_deviation(data.predicted).T
     for n in range(settings.rounds):
         asked = corrected(
@@ -109,22 +107,9 @@ def search(
         enough = settings.fine_step if done else settings.jacobian_valid
         away = farthest(best.posterior.vector, linearised)
         if renewed is not None and renewals > 0 and (done or n % 2 == 1) and away > enough:
-            if far:
-                best = last_settled = settled(best, last_settled, fine, data, settings, marches)
             renewals, linearised, stale, trust_radius = renewals - 1, best.posterior.vector, 0, longest
             derivatives = renewed(linearised, best.posterior.spread)
             jacobian = derivatives.per_deviation(data.predicted).T
         elif done:
             break
-    return settled(best, last_settled, fine, data, settings, marches) if far else best, derivatives
-
-
-def settled(
-    fit: Fit, before: Fit | None, fine: Room, data: Observations, settings: RoomSettings, marches: Marches
-) -> Fit:
-    """The fit, its room marched on under the same parameters, or the one settled `before` if that fits better."""
-    where, flow = fit.room.parameters, fit.room.flow.last
-    room = march_under(fine, where, flow, settings.settle_s, data.vertices, marches, doing=_SETTLING)
-    new = Fit(fit.posterior, room)
-    worse = before is not None and misfit_ratio(data, room, before.room) >= 1.0
-    return before.with_posterior_of(new) if worse else new
+    return best, derivatives

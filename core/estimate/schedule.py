@@ -21,8 +21,6 @@ def marched_s(prior: Prior, settings: RoomSettings) -> tuple[float, float]:
     restarts = (1 + len(prior.active())) * restart_s
     # The Jacobian and its renewals, and the second closure's run.
     coarse_s = settings.settle_s + (1 + settings.renewals) * restarts + restart_s
-    # The room as stated, each step, and where walls are unknown the best room before each renewal and at the end.
+    # The room as stated, and each step.
     fine_s = (1 + min(settings.rounds, _ROUNDS)) * settings.refine_s
-    if prior.unknown_walls():
-        fine_s += (1 + settings.renewals) * settings.settle_s
     return coarse_s, fine_s

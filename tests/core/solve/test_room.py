@@ -267,31 +267,6 @@ def test_a_search_whose_derivatives_mislead_comes_back_and_learns(unknown_walls:
     assert misfit_ratio(data, best.room, background.first) <= 1.0
 
 
-def test_a_room_of_unknown_walls_is_marched_on_under_what_was_found(unknown_walls: Background):
-    background = unknown_walls
-    data = observations(background.problem, (SETTINGS.vertices,) * 3)
-    marches = Marches()
-    settings = replace(SETTINGS, rounds=1, renewals=0)
-    begun = Fit.begun(np.zeros(len(background.prior.active())), background.first)
-    best, _ = search(
-        background.fine,
-        background.prior,
-        data,
-        begun,
-        background.derivatives,
-        settings,
-        marches,
-        lambda *_: background.derivatives,
-    )
-
-    stepped, settled = (row for row in marches.history if "change" in row)
-    assert stepped["doing"] != settled["doing"]
-    # The walls were moved, and the air still follows them when the round's march ends.
-    assert settled["change"] < 0.5 * stepped["change"]
-    found = background.prior.parameters(best.posterior.vector)
-    np.testing.assert_array_equal(*(ravel_pytree(of)[0] for of in (best.room.parameters, found)))
-
-
 @pytest.fixture(scope="module")
 def under_k_epsilon(truth: Solution) -> tuple[Analysis, Room]:
     """A fitted room and its coarse one; the fields that are compared are put in their place."""
