@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.files.durable import write_text
 from app.jobs import JobSpec
 from app.jobs.folder import read_json
 from app.reconstruct.presets import PRESETS
@@ -71,7 +72,7 @@ def test_a_projector_that_falls_silent(station: Station, opens: Opens):
     expect(connect).to_be_visible()
     # Long enough to be seen by whatever machine this is.
     settings = station.app.state.services.folders.all()[0] / "experiment.toml"
-    settings.write_text(settings.read_text().replace("warm_up_s=8", "warm_up_s=15"))
+    write_text(settings, settings.read_text().replace("warm_up_s=8", "warm_up_s=15"))
     connect.click()
     page.get_by_role("button", name="Lamp on").click()
     footer = page.locator("footer")

@@ -5,6 +5,7 @@ import re
 from playwright.sync_api import expect
 
 from app.client import Client
+from app.files.durable import write_text
 from tests.browser.conftest import Opens, Station, snapshot
 
 MOST = 6
@@ -57,7 +58,7 @@ def test_six_clicks_lead_from_nothing_to_the_moving_room(station: Station, opens
     # A grid that any machine solves within the test's time.
     folder = station.app.state.services.folders.all()[0]
     settings = folder / "experiment.toml"
-    settings.write_text(settings.read_text().replace('grid = "auto"', "grid = 8"))
+    write_text(settings, settings.read_text().replace('grid = "auto"', "grid = 8"))
     click("Calibrate")
     click("Take the reference")
     click("Take the flow")

@@ -400,9 +400,8 @@ def test_profiles_over_the_height_stand_beside_the_truth_and_the_sensors(station
     expect(pole.first.locator("path.found")).to_be_visible()
     assert f"{floor_c:.2f} °C at the floor" in str(said)
 
-    (experiment.folder / "sensors.csv").write_text(
-        "x,y,z,T,T_std\n0.5,0,0.5,296.5,0.1\n0.5,0,1.5,299.5,0.1\n"
-    )
+    readings = "x,y,z,T,T_std\n0.5,0,0.5,296.5,0.1\n0.5,0,1.5,299.5,0.1\n"
+    write_text(experiment.folder / "sensors.csv", readings)
     scene = experiment.settings.scene
     known = (*scene.boundary, PointSensors(file="sensors.csv"))
     stated = experiment.settings.model_copy(update={"scene": dataclasses.replace(scene, boundary=known)})

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.files.durable import write_text
 from drivers.simulated import CameraFault, SimulatedCamera
 from tests.app.rig.test_live_camera import SCENE
 from tests.browser.conftest import PAGE, Opens, Station, snapshot
@@ -209,10 +210,9 @@ def test_text_of_others_is_shown_and_never_run(station: Station, opens: Opens):
     services = station.app.state.services
     text = "<img src=x onerror=\"document.title='owned'\">"
     folder: Path = services.folders.all()[0]
-    settings = (
-        (folder / "experiment.toml").read_text().replace('title = "Simulated room"', f"title = '''{text}'''")
-    )
-    (folder / "experiment.toml").write_text(settings)
+    settings = folder / "experiment.toml"
+    # Whole at once: the page is reading this file all the time.
+    write_text(settings, settings.read_text().replace('title = "Simulated room"', f"title = '''{text}'''"))
     page.reload()
     expect(page.locator("main")).to_contain_text(text)
     assert page.title() == "airlens"
