@@ -5,6 +5,9 @@ fits worse is rejected, and the next step from the best one is shorter; every fo
 (Broyden 1965), which is computed anew from time to time. Where walls are unknown, many parameters start far from the
 truth and compensate one another: each may be wrong by half the supply's excess temperature. There steps are damped
 from the beginning.
+
+Air that does not settle makes each march's room partly chance. So what is found is the mean of least misfit of all
+rooms that were marched (`core.estimate.mean_room`).
 """
 
 from collections.abc import Callable
@@ -15,6 +18,7 @@ import numpy as np
 from core.estimate.forward_runs import Derivatives, ForwardRun, RoomSettings, march_under
 from core.estimate.least_squares import LONGEST_STEP, Posterior
 from core.estimate.marches import Marches
+from core.estimate.mean_room import mean_fields, weights_of_least_misfit
 from core.estimate.observation import Observations
 from core.estimate.parameter_names import by_name
 from core.estimate.parameter_step import Vector, corrected, farthest, misfit_ratio, secant
@@ -67,7 +71,7 @@ def search(
     marches: Marches,
     renewed: Callable[[Vector, Vector], Derivatives] | None = None,
 ) -> tuple[Fit, Derivatives]:
-    """The parameters and forward run of least misfit, searched from `best`, and the last derivatives.
+    """The mean room of least misfit, searched from `best`, with its parameters, and the last derivatives.
 
     The derivatives are computed anew by `renewed`, over the parameters' posterior deviations, at most
     `settings.renewals` times: on every other round if the parameters have moved far, and when the rounds no longer
@@ -79,6 +83,7 @@ def search(
     grid_difference = data.predicted(best.room.fields) - data.predicted(derivatives.start)
     stale, renewals, trust_radius = 0, settings.renewals, longest
     jacobian = derivatives.per_deviation(data.predicted).T
+    marched = [best]
     for n in range(settings.rounds):
         asked = corrected(
             best.posterior.vector,
@@ -94,6 +99,7 @@ def search(
         new = Fit(
             asked, march_under(fine, where, flow, settings.refine_s, data.vertices, marches, doing=_DOING)
         )
+        marched.append(new)
         left = misfit_ratio(data, new.room, best.room)
         values = by_name(prior, new.posterior.vector)
         marches.record({"doing": _DOING, "round": n + 1.0, "misfit_left": left, **values})
@@ -112,4 +118,13 @@ def search(
             jacobian = derivatives.per_deviation(data.predicted).T
         elif done:
             break
-    return best, derivatives
+    return mean_fit(marched, best, prior, data), derivatives
+
+
+def mean_fit(marched: list[Fit], best: Fit, prior: Prior, data: Observations) -> Fit:
+    """The mean of least misfit of these rooms, with the covariance of `best`, one of them, and its march."""
+    rooms, nth = [fit.room.fields for fit in marched], [fit.room is best.room for fit in marched].index(True)
+    weights = weights_of_least_misfit(data, rooms, nth)
+    vector = np.tensordot(weights, np.stack([fit.posterior.vector for fit in marched]), axes=1)
+    room = ForwardRun(prior.parameters(vector), best.room.flow, mean_fields(rooms, weights))
+    return Fit(Posterior(vector, best.posterior.covariance, best.posterior.deviation), room)
