@@ -10,9 +10,10 @@ from jax.flatten_util import ravel_pytree
 
 from core.estimate.alternatives import explains_more, promising_closure, worth_large_eddies
 from core.estimate.forward_runs import Derivatives, march_under, perturbed
+from core.estimate.least_squares import Posterior
 from core.estimate.marches import Marches
 from core.estimate.observation import observations
-from core.estimate.parameter_fit import Background, Fit, search
+from core.estimate.parameter_fit import Background, Fit, mean_fit, search
 from core.estimate.parameter_names import by_name
 from core.estimate.parameter_step import misfit_ratio
 from core.estimate.posterior import Analysis, doubt_of_velocity, model_error_of, solution
@@ -265,6 +266,30 @@ def test_a_search_whose_derivatives_mislead_comes_back_and_learns(unknown_walls:
     assert np.abs(second).max() <= 0.5 * np.abs(first).max() + 1e-9
     assert np.dot(first, second) < 0.5 * np.dot(first, first)
     assert misfit_ratio(data, best.room, background.first) <= 1.0
+
+
+def test_the_mean_of_two_rooms_that_err_to_either_side_has_their_mean_parameters(unknown_walls: Background):
+    background = unknown_walls
+    data = observations(background.problem, (SETTINGS.vertices,) * 3)
+    first, prior = background.first, background.prior
+    shown = data.predicted(first.fields).reshape(data.shifts[0].displacement_px.shape)
+    of_first = eqx.tree_at(lambda d: d.shifts[0].displacement_px, data, shown)
+    fits = [
+        Fit(
+            Posterior(
+                side * np.ones(len(prior.active())), (2.0 + side) * np.eye(len(prior.active())), np.zeros(0)
+            ),
+            eqx.tree_at(lambda r: r.fields.excess_k, first, (1.0 + 0.2 * side) * first.fields.excess_k),
+        )
+        for side in (-1.0, 1.0)
+    ]
+    found = mean_fit(fits, fits[1], prior, of_first)
+
+    np.testing.assert_allclose(found.posterior.vector, 0.0, atol=0.05)
+    np.testing.assert_allclose(found.room.fields.excess_k, first.fields.excess_k, atol=0.05)
+    # How far to believe it, and the march, are those of the best one.
+    np.testing.assert_array_equal(found.posterior.covariance, fits[1].posterior.covariance)
+    assert found.room.flow is fits[1].room.flow
 
 
 @pytest.fixture(scope="module")
