@@ -3,13 +3,14 @@
 import os
 import shutil
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 from fastapi import FastAPI
 from playwright.sync_api import Browser, BrowserContext, Page, Route, expect, sync_playwright
+from playwright.sync_api import Error as PlaywrightError
 
 from app.api.factory import create_app
 from app.api.security.settings import ServiceConfig, new_token, service_config
@@ -36,6 +37,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for item in items:
             if Path(__file__).parent in item.path.parents:
                 item.add_marker(pytest.mark.skip(reason=reason))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Add to the report of a test that failed what its pages showed and complained of."""
+    report = yield
+    if report.failed and call.when == "call":
+        report.sections += [("page", watched.described()) for watched in _WATCHED]
+    return report
 
 
 @dataclass
@@ -103,7 +115,18 @@ class Watched:
     page: Page
     complaints: list[str]
 
+    def described(self) -> str:
+        """Its address, its complaints and its text."""
+        try:
+            return "\n".join(
+                (self.page.url, *self.complaints, self.page.locator("body").inner_text(timeout=2000))
+            )
+        except PlaywrightError as error:
+            return f"It cannot be read: {error}"
 
+
+# The pages of the test that runs.
+_WATCHED: list[Watched] = []
 Opens = Callable[..., Watched]
 
 
@@ -132,10 +155,13 @@ def opens(chromium: Browser) -> Iterator[Opens]:
             lambda m: complaints.append(f"{m.text} {m.location['url']}") if m.type == "error" else None,
         )
         page.on("pageerror", lambda error: complaints.append(str(error)))
+        watched = Watched(page, complaints)
+        _WATCHED.append(watched)
         page.goto(address)
-        return Watched(page, complaints)
+        return watched
 
     yield open_page
+    _WATCHED.clear()
     for context in contexts:
         context.close()
 
