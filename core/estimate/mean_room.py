@@ -1,6 +1,6 @@
-"""The weights of rooms whose mean leaves least of the data (stacking: Breiman 1996).
+"""The weighted mean of several marched rooms that fits the data best (stacking: Breiman 1996).
 
-Air that does not settle, and walls that change it slowly, make each march's room partly chance. A mean of several is
+Air that does not settle, and walls that change it slowly, make each marched room partly chance. A mean of several is
 less so.
 """
 
@@ -19,9 +19,10 @@ Weights = Float[np.ndarray, " rooms"]
 
 
 def weights_of_least_misfit(data: Observations, rooms: Sequence[RoomFields], best: int) -> Weights:
-    """The rooms' weights, at least 0 and 1 together; a datum counts by its noise and what the room `best` leaves.
+    """The weights with which the rooms' mean fits the data best: none is below 0, and they add up to 1.
 
-    The mean is a room between those that were marched: no difference of two rooms is enlarged.
+    So the mean lies between the rooms, and no difference of two is enlarged. Each datum is weighted by its noise and
+    by what the room `best`, an index, leaves of its kind.
     """
     left = [data.values()[0] - data.predicted(room) for room in rooms]
     variance = variance_of(data, left[best], left[best])

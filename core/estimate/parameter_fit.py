@@ -6,8 +6,8 @@ fits worse is rejected, and the next step from the best one is shorter; every fo
 truth and compensate one another: each may be wrong by half the supply's excess temperature. There steps are damped
 from the beginning.
 
-Air that does not settle makes each march's room partly chance. So what is found is the mean of least misfit of all
-rooms that were marched (`core.estimate.mean_room`).
+Air that does not settle makes each marched room partly chance. So the search ends with the weighted mean of all of
+them that fits the data best (`core.estimate.mean_room`).
 """
 
 from collections.abc import Callable
@@ -71,7 +71,7 @@ def search(
     marches: Marches,
     renewed: Callable[[Vector, Vector], Derivatives] | None = None,
 ) -> tuple[Fit, Derivatives]:
-    """The mean room of least misfit, searched from `best`, with its parameters, and the last derivatives.
+    """The mean of the rooms marched from `best` on that fits the data best, and the last derivatives.
 
     The derivatives are computed anew by `renewed`, over the parameters' posterior deviations, at most
     `settings.renewals` times: on every other round if the parameters have moved far, and when the rounds no longer
@@ -122,8 +122,9 @@ def search(
 
 
 def mean_fit(marched: list[Fit], best: Fit, prior: Prior, data: Observations) -> Fit:
-    """The mean of least misfit of these rooms, with the covariance of `best`, one of them, and its march."""
-    rooms, nth = [fit.room.fields for fit in marched], [fit.room is best.room for fit in marched].index(True)
+    """The mean of these rooms that fits the data best, with the covariance and the march of `best`, one of them."""
+    rooms = [fit.room.fields for fit in marched]
+    nth = [fit.room is best.room for fit in marched].index(True)
     weights = weights_of_least_misfit(data, rooms, nth)
     vector = np.tensordot(weights, np.stack([fit.posterior.vector for fit in marched]), axes=1)
     room = ForwardRun(prior.parameters(vector), best.room.flow, mean_fields(rooms, weights))
