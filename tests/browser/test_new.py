@@ -607,3 +607,28 @@ def test_names_in_the_drawings_of_a_rig_stay_inside_and_off_one_another(
     words = walls.locator("text").evaluate_all(BOXES)
     assert {"supply 1", "left (x_min)"} <= {one[0] for one in words}
     are_apart(words, walls)
+
+
+# The page's own code is asked for as soon as the page is there, and again where the operator goes there.
+@pytest.mark.parametrize(
+    ("lost", "times"), [("**/assets/New-*.js", 2), ("**/experiments/*/answers", 1), ("**/answers/check", 1)]
+)
+def test_a_request_that_is_lost_is_sent_again(station: Station, opens: Opens, lost: str, times: int):
+    with Client(f"http://127.0.0.1:{station.port}", station.token, timeout_s=200) as client:
+        client.create_from_answers(jet())
+    page = opens(station.address).page
+    refused: list[str] = []
+
+    def refuse(route: Route) -> None:
+        refused.append(route.request.url)
+        route.abort()
+
+    edit = page.get_by_role("button", name="Edit room")
+    expect(edit).to_be_visible()
+    page.route(lost, refuse, times=times)
+    page.reload()
+    edit.click()
+    expect(page.locator("button.next")).to_have_text("Change the room")
+    expect(page.locator(".rig3d svg")).to_be_visible()
+    expect(page.get_by_role("alert")).to_have_count(0)
+    assert len(refused) == times

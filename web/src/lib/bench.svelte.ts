@@ -106,6 +106,7 @@ class Bench {
 
   private stream: EventSource | null = null;
   private pending = new Set<string>();
+  private soon: ReturnType<typeof setTimeout> | undefined;
   /** The operator has chosen a page: the first answers no longer choose one. */
   private turned = false;
   private again: (() => Promise<unknown>) | null = null;
@@ -167,6 +168,7 @@ class Bench {
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
       this.problem = error.problem;
+      if (error.problem.code === "unreachable") this.missed();
       return undefined;
     } finally {
       this.working = null;
@@ -482,6 +484,17 @@ class Bench {
     this.stream = stream;
   }
 
+  /** A request met no service. Where the stream of events does not notice, what was to be read is read again soon. */
+  missed(): void {
+    this.soon ??= setTimeout(() => {
+      this.soon = undefined;
+      // A stream that broke as well tells when the service is back.
+      if (!this.connected) return;
+      this.returns++;
+      void this.later("all");
+    }, 2000);
+  }
+
   private hear(event: EventResource): void {
     if (event.kind === "capture") {
       if (this.desk) this.desk = { ...this.desk, ...(event.body as Partial<DeskResource>) };
@@ -521,7 +534,8 @@ class Bench {
       if (what === "experiment") this.desk = await ask("GET /captures/running", {});
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
-      if (error.problem.code !== "unreachable") this.problem = error.problem;
+      if (error.problem.code === "unreachable") this.missed();
+      else this.problem = error.problem;
     }
   }
 }

@@ -180,6 +180,7 @@ class Draft {
       // What was checked before is not what is typed now.
       this.check = null;
       bench.problem = this.refusal = error.problem;
+      if (error.problem.code === "unreachable") bench.missed();
     }
   }
 
