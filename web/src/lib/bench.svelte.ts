@@ -458,7 +458,7 @@ class Bench {
   async takeNextStep(): Promise<void> {
     const { label, page, act, busy } = this.next;
     if (busy) return;
-    this.page = page;
+    this.turn(page);
     this.done = "";
     await this.attempt(label, act);
   }
