@@ -106,6 +106,7 @@ class Bench {
 
   private stream: EventSource | null = null;
   private pending = new Set<string>();
+  /** Waits to read again what a lost request did not. */
   private soon: ReturnType<typeof setTimeout> | undefined;
   /** The operator has chosen a page: the first answers no longer choose one. */
   private turned = false;
@@ -484,7 +485,7 @@ class Bench {
     this.stream = stream;
   }
 
-  /** A request met no service. Where the stream of events does not notice, what was to be read is read again soon. */
+  /** A request did not reach the service. The stream of events may not notice, so all is read again two seconds later. */
   missed(): void {
     this.soon ??= setTimeout(() => {
       this.soon = undefined;
