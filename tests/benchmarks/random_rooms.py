@@ -8,11 +8,13 @@ it is computed by OpenFOAM under k-epsilon, RNG k-epsilon or k-omega SST (`--by 
 as their deviations say. Rooms of even number are for choosing anything, those of odd number for figures; from 1000 on
 they are for nobody to look at.
 
-    python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 32] [--by openfoam]
-        [--views y,x] [--information surveyed] [--wrong 1.2]
-    python -m tests.benchmarks.random_rooms FOLDER --summary [--views y,x] [--information surveyed] [--wrong 1.2]
+    python -m tests.benchmarks.random_rooms FOLDER --first 1 --rooms 12 [--cells 48] [--by openfoam]
+        [--preset reference] [--views y,x] [--information surveyed] [--wrong 1.2]
+    python -m tests.benchmarks.random_rooms FOLDER --summary [--preset reference] [--views y,x]
+        [--information surveyed] [--wrong 1.2]
     python -m tests.benchmarks.random_rooms FOLDER --stated  # everything is known, nothing is fitted
 
+`--cells` replaces the cells an edge of the preset's fine room.
 With `--wrong` the supply that brings most air is entered so many times too fast, and too far from the ambient
 temperature. Volumes and rows stay in FOLDER; a room that has its row by these options is not fitted again.
 """
@@ -28,6 +30,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from app.bench.room_fit import mistaken, problem_of, scores_of, solved
+from app.reconstruct.presets import REFERENCE, STANDARD
 from app.reconstruct.problem import with_scene
 from app.volume.file import read_volume
 from app.volume.misread import misread
@@ -40,11 +43,11 @@ from core.room.forward import room, room_fields
 from core.room.k_epsilon import NOMINAL_HEAT_M_S
 from core.room.march import MarchSettings, march
 from core.scene import Inlet, Outlet
-from core.solve.room import RoomSettings
 from tests.benchmarks.foam_rooms import MODELS, computed
 from tests.benchmarks.indoor_coverage import row_of as indoor_row
 from tests.benchmarks.other_rooms import T0_K, Made, marched
 
+PRESETS = {"standard": STANDARD, "reference": REFERENCE}
 _SEED = 2611
 _NAMES = ("xMinWall", "xMaxWall", "front", "back", "floor", "ceiling")
 # From this number on, openings stand on any wall but the patterned one and the floor.
@@ -160,8 +163,9 @@ def made(folder: Path, number: int, by: str) -> Path:
 def row_of(
     folder: Path,
     number: int,
-    cells: int,
+    cells: int | None,
     by: str,
+    preset: str,
     walls: tuple[WallName, ...],
     information: Information,
     wrong: float,
@@ -174,12 +178,14 @@ def row_of(
     add = stated and information == "operator"
     exact = problem.scene
     problem = _entered(problem, number, heater_of(read_volume(path)) if add else None, wrong)
-    solution, cpu_s = solved(problem, RoomSettings(cells=cells))
+    settings = PRESETS[preset]
+    solution, cpu_s = solved(problem, settings if cells is None else replace(settings, cells=cells))
     fit = scores_of(solution, cpu_s, volume)
     said = " ".join(fit["notes"])
     carried_k = inner(volume.temperature_k[:1] - volume.temperature_k)
     return {
         "room": number,
+        "preset": preset,
         "views": walls,
         "information": information,
         "wrong": wrong,
@@ -195,7 +201,7 @@ def row_of(
     }
 
 
-def stated_row(folder: Path, number: int, cells: int, by: str) -> dict[str, Any]:
+def stated_row(folder: Path, number: int, cells: int | None, by: str) -> dict[str, Any]:
     """How far off a march is with everything stated as it is, under either closure, and nothing fitted.
 
     What OpenFOAM's outlets take is stated too, and its heaters give off heat by the wall function, as its walls do.
@@ -203,6 +209,7 @@ def stated_row(folder: Path, number: int, cells: int, by: str) -> dict[str, Any]
     mean over its first half is from the mean over all, over its rms).
     """
     path, what = made(folder, number, by), drawn(number)
+    cells = cells or STANDARD.cells
     volume, truth = read_volume(path), json.loads(path.with_suffix(".json").read_text())
     row = {"room": number, "truth": truth["closure"], "cells": cells, "truth_moves": truth.get("change_u")}
     scene = room_scene(volume, RigOptions(), "surveyed")
@@ -274,9 +281,14 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _how(row: dict[str, Any]) -> tuple[tuple[WallName, ...], Information, float]:
-    """A row's views and information, and how wrong a supply is entered."""
-    return tuple(row.get("views", ("y_max",))), row.get("information", "operator"), row.get("wrong", 1.0)
+def _how(row: dict[str, Any]) -> tuple[str, tuple[WallName, ...], Information, float]:
+    """A row's preset, views and information, and how wrong a supply is entered."""
+    return (
+        row.get("preset", "standard"),
+        tuple(row.get("views", ("y_max",))),
+        row.get("information", "operator"),
+        row.get("wrong", 1.0),
+    )
 
 
 def main() -> None:
@@ -287,8 +299,11 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--rooms", type=int, default=12, help="every second one from --first")
-    parser.add_argument("--cells", type=int, default=32)
+    parser.add_argument(
+        "--cells", type=int, help="an edge of the fine room; those of the preset unless given"
+    )
     parser.add_argument("--by", choices=("airlens", "openfoam"), default="airlens")
+    parser.add_argument("--preset", choices=PRESETS, default="standard")
     parser.add_argument("--views", default="y", help="the walls that are looked at, such as y,x")
     parser.add_argument("--information", choices=get_args(Information), default="operator")
     parser.add_argument("--wrong", type=float, default=1.0, help="multiplies the largest supply as entered")
@@ -299,7 +314,7 @@ def main() -> None:
     rows = options.folder / ("stated.jsonl" if options.stated else "rows.jsonl")
     walls = parse_walls(options.views)
     done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
-    asked = walls, options.information, options.wrong
+    asked = options.preset, walls, options.information, options.wrong
     done = [row for row in done if _how(row) == asked]
     if options.summary:
         print(json.dumps(summary([row for row in done if row["room"] % 2])))
